@@ -1,0 +1,56 @@
+/* How well a skin lies on a target: cavity volume, gap, target gap, coverage, objective (definitions:
+ * README). */
+#ifndef MORPH_CAVITY_H
+#define MORPH_CAVITY_H
+
+#include "model/distance.h"
+#include "model/structure.h"
+
+/* A skin sample: barycentric point of a skin triangle, with its share of the skin's area at the start. */
+typedef struct morph_skin_sample {
+    int joint[3];
+    double weight[3];
+    double area; /* m2, fixed at the start pose */
+} morph_skin_sample;
+
+/* An exposed point of the target: first hit of a vertical line from above. */
+typedef struct morph_exposed {
+    double point[3], normal[3];
+    double area; /* projected, m2 */
+} morph_exposed;
+
+typedef struct morph_cavity {
+    const morph_structure *structure;
+    const morph_distance *target;
+    double base; /* height of the base plane, NaN for none */
+    int samples, exposed;
+    morph_skin_sample *sample;
+    morph_exposed *expose;
+    double start_area;
+} morph_cavity;
+
+/* Keeps pointers to structure and target: both must outlive the cavity. Sample density follows the spacing: 6
+ * per skin triangle or better; exposed points at most an eighth of the spacing apart. */
+morph_status morph_cavity_create(const morph_structure *structure, const morph_distance *target, double base,
+                                 morph_cavity **out);
+void morph_cavity_destroy(morph_cavity *cavity);
+
+typedef struct morph_measure {
+    double volume;                                 /* cavity volume, m3 */
+    double gap_mean, gap_p95, gap_max, gap_target; /* m */
+    double coverage;                               /* 0..1 */
+    double objective;                              /* m4: sum A_q gap^2 + w_c sum A_y dist^2 */
+} morph_measure;
+
+/* Weight w_c of the target's term in the objective. */
+#define MORPH_COVER_WEIGHT 1.0
+
+/* x: 3*joints. Exact distances throughout. */
+morph_status morph_cavity_measure(const morph_cavity *cavity, const double *x, morph_measure *out);
+
+/* For each exposed point the closest skin point: joints and weights (exposed entries each), distance. Arrays
+ * are the caller's; any may be NULL. */
+morph_status morph_cavity_closest(const morph_cavity *cavity, const double *x, int (*joint)[3],
+                                  double (*weight)[3], double *distance);
+
+#endif

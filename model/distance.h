@@ -1,0 +1,52 @@
+/* Exact signed distance to a triangle mesh (our own bounding volume tree). Negative inside. For closed meshes
+ * the inside is decided by angle-weighted pseudonormals; for open ones by the generalised winding number
+ * (Jacobson et al. 2013). */
+#ifndef MORPH_DISTANCE_H
+#define MORPH_DISTANCE_H
+
+#include "model/mesh.h"
+
+typedef struct morph_distance morph_distance; /* immutable after create: may be shared by threads */
+
+typedef struct morph_closest {
+    double distance;  /* signed, m */
+    double point[3];  /* on the mesh */
+    double normal[3]; /* unit gradient of the signed distance at the query (away from the mesh outside) */
+    int triangle;
+} morph_closest;
+
+/* The mesh is copied. */
+morph_status morph_distance_create(const morph_mesh *mesh, bool closed, morph_distance **out);
+void morph_distance_destroy(morph_distance *d);
+const morph_mesh *morph_distance_mesh(const morph_distance *d);
+
+void morph_distance_point(const morph_distance *d, const double p[3], morph_closest *out);
+/* Only |distance| up to `bound` matters: returns as soon as the distance is known to exceed it (out->triangle
+ * = -1, out->distance = +-bound). */
+void morph_distance_point_bounded(const morph_distance *d, const double p[3], double bound,
+                                  morph_closest *out);
+
+/* Least signed distance over a segment or a triangle. Exact (to rounding) where the element is clear of the
+ * mesh; where it touches or enters, the deepest point found (negative or 0). weight: barycentric weights of
+ * that point on the element. */
+void morph_distance_segment(const morph_distance *d, const double a[3], const double b[3], double weight[2],
+                            morph_closest *out);
+void morph_distance_triangle(const morph_distance *d, const double a[3], const double b[3], const double c[3],
+                             double weight[3], morph_closest *out);
+
+/* Generalised winding number at p. */
+double morph_winding(const morph_distance *d, const double p[3]);
+bool morph_inside(const morph_distance *d, const double p[3]);
+
+/* All crossings of the vertical line through (x, y) with the mesh: heights ascending, sign +1 where the
+ * surface's outward normal points up. Returns the count (at most capacity are written). */
+int morph_vertical_hits(const morph_distance *d, double x, double y, double *z, int *sign, int capacity);
+
+/* Closest points of two segments: parameters s, t in [0,1]; returns the distance. */
+double morph_segment_segment(const double a0[3], const double a1[3], const double b0[3], const double b1[3],
+                             double *s, double *t);
+/* Closest point of triangle abc to p: weights; returns the distance. */
+double morph_point_triangle(const double p[3], const double a[3], const double b[3], const double c[3],
+                            double weight[3]);
+
+#endif

@@ -1,0 +1,56 @@
+/* The record: an in-memory mirror of plan.h5. Planner fills it; writer, reader, check, picture, report and
+ * export read it. Self-contained: nothing in it points elsewhere. Arrays are owned; a NULL array is a dataset
+ * that is absent. */
+#ifndef MORPH_RECORD_H
+#define MORPH_RECORD_H
+
+#include "solvers/base.h"
+
+typedef struct morph_record {
+    /* root attributes */
+    double base;      /* NaN: none */
+    char program[64]; /* "morphplan 0.1.0" */
+    char scene_sha256[65];
+    char outcome[16]; /* optimal, feasible, infeasible, stopped */
+    /* structure/ */
+    int joints, links, posts, link_posts, link_links, skin_triangles, panels, fixed_count;
+    int *joint_layer;
+    int (*joint_node)[2];
+    int (*link)[2];
+    int *link_kind;
+    double (*length_limit)[2];
+    double *rate_limit, *acceleration_limit, *jerk_limit, *link_radius;
+    int (*post)[2];
+    double *post_length;
+    int (*link_post)[2];
+    double (*link_post_limit)[2];
+    int (*link_link)[2];
+    double (*link_link_limit)[2];
+    int (*skin)[3];
+    int (*panel)[2];
+    int *fixed;
+    double spacing; /* structure@spacing, an attribute of the group */
+    /* target/ */
+    int target_vertices, target_triangles;
+    double *target_v;
+    int *target_t;
+    double *offset_nominal;  /* nominal_frames x 3 */
+    double *offset_schedule; /* samples x 3 */
+    /* nominal/ */
+    int nominal_frames;
+    double *nominal_time, *nominal_joints, *nominal_lengths;
+    /* path/ */
+    int poses;
+    double *path_s, *path_poses; /* poses; poses x 6*posts (centre, direction) */
+    /* schedule/ */
+    int samples;
+    double *time, *schedule_joints, *length, *rate, *acceleration;
+    /* mobility/ */
+    int mobility_samples;
+    int *mobility_sample, *mobility_rank, *mobility_free, *mobility_redundant;
+    double *mobility_sigma_min;
+} morph_record;
+
+void morph_record_free(morph_record *record); /* frees the arrays and zeroes *record */
+
+#endif

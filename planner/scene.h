@@ -1,0 +1,77 @@
+/* A scene: everything a user says of a morph, with every default filled in. */
+#ifndef MORPH_SCENE_H
+#define MORPH_SCENE_H
+
+#include "model/mesh.h"
+#include "model/structure.h"
+
+typedef enum morph_shape {
+    MORPH_SHAPE_BOX,
+    MORPH_SHAPE_SPHERE,
+    MORPH_SHAPE_ELLIPSOID,
+    MORPH_SHAPE_CYLINDER,
+    MORPH_SHAPE_CONE,
+    MORPH_SHAPE_TORUS,
+    MORPH_SHAPE_CAPSULE,
+    MORPH_SHAPE_MESH,
+    MORPH_SHAPE_HEIGHTMAP
+} morph_shape;
+
+typedef struct morph_target_def {
+    morph_shape shape;
+    double size[3]; /* box */
+    double radius,
+        height;      /* sphere, cylinder, cone, capsule (height: whole length); torus: radius of its circle */
+    double tube;     /* torus: radius of the tube */
+    double radii[3]; /* ellipsoid */
+    char
+        *file; /* mesh, heightmap: as found (relative to the scene's folder already joined); NULL otherwise */
+    char *file_as_written; /* as the scene says it */
+    double cell;           /* heightmap: distance of samples, in the file's unit of height */
+    double scale;          /* 1 */
+    bool has_fit;
+    double fit[3];
+    double
+        rotate[3]; /* radians about the fixed x, then y, then z axis, about the centre of the bounding box */
+    double at[3];  /* where the centre of the bounding box goes, last */
+} morph_target_def;
+
+typedef enum morph_mode { MORPH_MODE_DROP, MORPH_MODE_RISE } morph_mode;
+
+typedef struct morph_motion_def {
+    morph_mode mode;
+    double height, gravity, drag, friction, time;
+} morph_motion_def;
+
+typedef enum morph_attractors { MORPH_ATTRACT_AUTO, MORPH_ATTRACT_NONE } morph_attractors;
+
+typedef struct morph_scene {
+    char *file; /* path of the scene */
+    char *title;
+    char sha256[65]; /* of the scene file's bytes, hexadecimal */
+    morph_structure_def structure;
+    morph_target_def target_def;
+    double base; /* NaN: none */
+    morph_motion_def motion;
+    morph_attractors attractors;
+    double duration;   /* s; 0: auto */
+    double sample;     /* s */
+    morph_mesh target; /* built, in world coordinates, mended */
+    morph_mesh_report target_report;
+} morph_scene;
+
+/* Where faults go: one line each, "FILE:LINE: key: what is wrong, what is allowed". */
+typedef void (*morph_fault_sink)(void *user, const char *line);
+
+/* Reads and validates; *out is NULL unless MORPH_OK. All faults of the file are reported before
+ * MORPH_ERR_INPUT is returned. Warnings (an open mesh) go to `warn`. The target is imported and transformed
+ * too. */
+morph_status morph_scene_read(const char *path, morph_fault_sink fault, morph_fault_sink warn, void *user,
+                              morph_scene **out);
+void morph_scene_destroy(morph_scene *scene);
+
+/* The scene with every default written out, as YAML text (free with free()). mesh_file: what to write as
+ * target.file (the copy beside it), NULL for shapes without one. Reading it again gives the same plan. */
+morph_status morph_scene_to_yaml(const morph_scene *scene, const char *mesh_file, char **text);
+
+#endif

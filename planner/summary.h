@@ -1,0 +1,48 @@
+/* Numbers of one plan: summary.json and the six lines. */
+#ifndef MORPH_SUMMARY_H
+#define MORPH_SUMMARY_H
+
+#include "model/blanket.h"
+#include "model/cavity.h"
+#include "planner/check.h"
+
+enum { MORPH_STAGES = 8 };
+typedef enum morph_stage {
+    MORPH_STAGE_TARGET,
+    MORPH_STAGE_NOMINAL,
+    MORPH_STAGE_REFINE,
+    MORPH_STAGE_PATH,
+    MORPH_STAGE_TIMING,
+    MORPH_STAGE_MEASURE,
+    MORPH_STAGE_CHECK,
+    MORPH_STAGE_WRITE
+} morph_stage;
+const char *morph_stage_name(morph_stage stage); /* "target", "nominal", "refine", "path", ... */
+
+typedef struct morph_summary {
+    char title[128], scene[256], method[16], level[16];
+    char outcome[16];
+    bool feasible;
+    char reason[512]; /* why not feasible: constraint, element, time, amount; else empty */
+    bool has_plan, has_blanket;
+    morph_measure blanket, plan;
+    double target_volume;
+    double spacing;
+    morph_check_report check;
+    int free_motions, redundant;
+    double sigma_min; /* at the end of the schedule */
+    double duration;
+    int iterations_refine, iterations_path, iterations_timing;
+    int unknowns_refine, rows_refine_used, rows_refine_possible;
+    int unknowns_path, rows_path_used, rows_path_possible;
+    double linear_seconds, callback_seconds;
+    double seconds[MORPH_STAGES];
+    double total_seconds;
+    long peak_memory_bytes;
+    morph_blanket_report blanket_report;
+    double sdf_cell, sdf_rms, sdf_max;
+    char blas[64]; /* BLAS kernel name, "" if unknown */
+    char warning[512];
+} morph_summary;
+
+#endif

@@ -1,0 +1,69 @@
+#include "solvers/base.h"
+
+#include <dlfcn.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+const char *morph_status_text(morph_status status) {
+    switch (status) {
+    case MORPH_OK:
+        return "ok";
+    case MORPH_ERR_NOMEM:
+        return "out of memory";
+    case MORPH_ERR_INPUT:
+        return "unusable input";
+    case MORPH_ERR_NONFINITE:
+        return "a number is not finite";
+    case MORPH_ERR_BACKEND:
+        return "a library failed";
+    case MORPH_ERR_IO:
+        return "input or output failed";
+    case MORPH_ERR_STOPPED:
+        return "stopped";
+    case MORPH_ERR_INTERNAL:
+        return "internal error";
+    }
+    return "unknown status";
+}
+
+bool morph_stopped(const morph_control *control) {
+    return control && control->stop && control->stop(control->user) != 0;
+}
+
+void morph_progress(const morph_control *control, const char *stage, double fraction) {
+    if (control && control->progress) control->progress(control->user, stage, fraction);
+}
+
+void morph_log(const morph_control *control, const char *format, ...) {
+    if (!control || !control->log) return;
+    char line[1024];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    control->log(control->user, line);
+}
+
+double morph_seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void morph_blas_threads(int n) {
+    /* Looked up at run time: with another BLAS there is nothing to pin. */
+    union {
+        void *object;
+        void (*call)(int);
+    } set = {dlsym(RTLD_DEFAULT, "openblas_set_num_threads")};
+    if (set.object) set.call(n);
+}
+
+void *morph_alloc(size_t n, size_t m) {
+    if (m != 0 && n > SIZE_MAX / m) return NULL;
+    const size_t bytes = n * m;
+    return calloc(bytes > 0 ? bytes : 1, 1);
+}

@@ -1,0 +1,35 @@
+/* Exact distances between separated meshes by FCL, for verification. The implementation is the only C++ file;
+ * no exception leaves it. */
+#ifndef MORPH_COLLISION_H
+#define MORPH_COLLISION_H
+
+#include "solvers/base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct morph_solid morph_solid; /* a target as a bounding volume hierarchy (OBBRSS) */
+
+/* v: 3*vertices, t: 3*triangles; copied. Non-finite vertices are refused (MORPH_ERR_NONFINITE): FCL would
+ * lose contacts silently. */
+morph_status morph_solid_create(const double *v, int vertices, const int *t, int triangles,
+                                morph_solid **out);
+void morph_solid_destroy(morph_solid *solid);
+
+/* Least distance between the solid's surface and a set of loose triangles (9 doubles each; a link is given as
+ * a triangle with a repeated or middle vertex). *distance is 0 when any pair touches or crosses; *element is
+ * the number of the nearest loose triangle. A set inside the solid without touching the surface is not
+ * noticed: the caller asks an inside test of its own. */
+morph_status morph_solid_distance(const morph_solid *solid, const double *triangles, int count,
+                                  double *distance, int *element);
+
+/* Pairs of boxes that overlap (broad phase): lo, hi 3*count each; pairs receives up to capacity (i < j);
+ * *found the true count. */
+morph_status morph_box_pairs(const double *lo, const double *hi, int count, int (*pairs)[2], int capacity,
+                             int *found);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
