@@ -28,6 +28,7 @@ typedef struct pather {
     double *metres; /* capacity x coordinates */
     double *lower;
     double started;
+    morph_control quiet; /* the caller's control without its log */
 } pather;
 
 static double *pose(pather *p, int k) {
@@ -96,7 +97,7 @@ static morph_status solve_once(pather *p, double *x, const double *reference, co
     o.tolerance = 1e-5; /* of an objective in spacings^2: moves no joint by a hundredth of a link's radius */
     o.max_iterations = 80;
     o.mu_init = 1e-2;
-    o.control = p->options->control;
+    o.control = &p->quiet;
     status = morph_nlp_solve(nlp, x, &o, result);
     morph_nlp_destroy(nlp);
     if (status != MORPH_OK) return status;
@@ -305,6 +306,8 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     p.metres = morph_alloc(rows * width, sizeof(double));
     p.lower = morph_alloc(width, sizeof(double));
     morph_status status = p.s && p.x && p.inset && p.metres && p.lower ? MORPH_OK : MORPH_ERR_NOMEM;
+    if (options->control) p.quiet = *options->control;
+    p.quiet.log = NULL;
     if (status == MORPH_OK) {
         set_guided_poses(&p, guide, start, end);
         status = run(&p, out);

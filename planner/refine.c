@@ -19,7 +19,8 @@ morph_refine_options morph_refine_defaults(void) {
     return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 1e-3, .self = 1e-3},
                                   .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.1,
-                                  .rounds = 10};
+                                  .reach = 0.3,
+                                  .rounds = 12};
 }
 
 typedef struct refiner {
@@ -29,7 +30,8 @@ typedef struct refiner {
     morph_active *active;
     int (*cover_joint)[3];
     double (*cover_weight)[3];
-    double *x, *best, *metres, *lower; /* coordinates each; x, best scaled */
+    double *x, *best, *metres, *base, *lower, *upper; /* coordinates each; all but metres scaled */
+    morph_control quiet; /* the caller's control without its log: the solver's own lines are too many */
     double best_objective;
     double best_violation;
     bool best_feasible, have_best;
@@ -41,10 +43,13 @@ static morph_status allocate(refiner *r) {
     r->x = morph_alloc(n, sizeof(double));
     r->best = morph_alloc(n, sizeof(double));
     r->metres = morph_alloc(n, sizeof(double));
+    r->base = morph_alloc(n, sizeof(double));
     r->lower = morph_alloc(n, sizeof(double));
+    r->upper = morph_alloc(n, sizeof(double));
     r->cover_joint = morph_alloc(y, sizeof(int[3]));
     r->cover_weight = morph_alloc(y, sizeof(double[3]));
-    if (!r->x || !r->best || !r->metres || !r->lower || !r->cover_joint || !r->cover_weight)
+    if (!r->x || !r->best || !r->metres || !r->base || !r->lower || !r->upper || !r->cover_joint ||
+        !r->cover_weight)
         return MORPH_ERR_NOMEM;
     return morph_active_create(r->world->structure, &r->active);
 }
@@ -53,7 +58,9 @@ static void release(refiner *r) {
     free(r->x);
     free(r->best);
     free(r->metres);
+    free(r->base);
     free(r->lower);
+    free(r->upper);
     free(r->cover_joint);
     free(r->cover_weight);
     morph_active_destroy(r->active);
@@ -109,7 +116,11 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     blocks[count++] = morph_block_cover(&cover, NULL);
     char message[256] = "";
     morph_nlp *nlp = NULL;
-    status = morph_nlp_create(n, r->x, r->lower, NULL, blocks, count, message, sizeof message, &nlp);
+    for (int i = 0; i < n; i++) {
+        r->lower[i] = fmax(r->base[i], r->x[i] - r->options->reach);
+        r->upper[i] = fmax(r->lower[i], r->x[i]) + r->options->reach;
+    }
+    status = morph_nlp_create(n, r->x, r->lower, r->upper, blocks, count, message, sizeof message, &nlp);
     if (status != MORPH_OK) {
         morph_log(r->options->control, "refine: %s", message);
         return status;
@@ -124,7 +135,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     o.tolerance = round < 2 ? 1e-4 : 1e-5;
     o.max_iterations = 150;
     o.mu_init = round == 0 ? 1e-2 : 1e-4;
-    o.control = r->options->control;
+    o.control = &r->quiet;
     if (r->options->seconds > 0.0)
         o.max_seconds = fmax(0.1, r->options->seconds - (morph_seconds() - r->started));
     status = morph_nlp_solve(nlp, r->x, &o, result);
@@ -145,7 +156,10 @@ static void tally(refiner *r, const morph_nlp_result *result) {
 
 static morph_status rounds(refiner *r) {
     const morph_refine_options *o = r->options;
-    const morph_nearness near = {.length = 0.08, .angle = 0.12, .clearance = 0.15, .self = 0.1};
+    /* Two ends move apart by twice the reach, and an angle turns by that over a length: about the most that
+     * one round can do. */
+    const double reach = o->reach;
+    const morph_nearness near = {.length = reach, .angle = reach, .clearance = reach, .self = reach};
     morph_violation v;
     double objective;
     morph_status status = morph_pose_examine(r->world, r->x, &o->inset, &near, r->active, NULL, &v);
@@ -188,7 +202,9 @@ morph_status morph_refine(const morph_world *world, const morph_refine_options *
     if (status == MORPH_OK) {
         for (int i = 0; i < n; i++)
             r.x[i] = x[i] / s->spacing;
-        morph_pose_bounds(world, options->inset.clearance, r.lower);
+        morph_pose_bounds(world, options->inset.clearance, r.base);
+        if (options->control) r.quiet = *options->control;
+        r.quiet.log = NULL;
         status = rounds(&r);
     }
     if (r.have_best) {

@@ -9,6 +9,7 @@ typedef struct morph_refine_options {
     morph_inset inset;
     double cover_weight; /* w_c */
     double slide;        /* pull across the target's normal, relative to along it */
+    double reach;        /* how far a joint may move in one round, spacings: rows are chosen for that reach */
     int rounds;          /* solves, at most */
     double seconds;      /* wall; <= 0: none */
     const morph_control *control;
