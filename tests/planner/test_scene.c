@@ -302,7 +302,7 @@ static void test_numbers(void **state) {
     }
     for (int degrees = 0; degrees <= 180; degrees++) {
         morph_degrees_print(morph_radians(degrees), text);
-        char expected[8];
+        char expected[16];
         snprintf(expected, sizeof expected, "%d", degrees);
         assert_string_equal(text, expected);
     }
