@@ -134,6 +134,7 @@ morph_number_kind morph_number_parse(const char *text, double *out);
 enum { MORPH_NUMBER_TEXT = 32 };
 void morph_number_print(double x, char *text);
 double morph_radians(double degrees);
+double morph_degrees(double radians);
 /* The shortest decimal of degrees that morph_radians turns into the same radians; the closest one if there is
  * none (radians that did not come from degrees). Returns the degrees that text says. */
 double morph_degrees_print(double radians, char *text);

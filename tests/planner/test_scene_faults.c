@@ -562,6 +562,10 @@ static void test_missing_files(void **state) {
     assert_null(scene);
     assert_int_equal(faults.count, 1);
     assert_non_null(strstr(faults.text[0], "/no/such/scene.yaml:1: scene: cannot be read: No such file"));
+    /* One line, whatever the name. */
+    faults.count = 0;
+    assert_int_equal(morph_scene_read("no\nsuch\tscene", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
+    assert_int_equal(strncmp(faults.text[0], "no?such?scene:1: scene: cannot be read", 38), 0);
     faults.count = 0;
     assert_int_equal(morph_scene_read("/tmp", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
     assert_int_equal(faults.count, 1);
