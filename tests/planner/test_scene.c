@@ -498,6 +498,24 @@ static void test_shared_models(void **state) {
         read_scene(MORPH_SOURCE_DIR "/tests/scenes", names[k]);
 }
 
+static void count_warning(void *user, const char *line) {
+    ++*(int *)user;
+    assert_non_null(strstr(line, "s.yaml:3: target.at: the target lies beside the grid (in y)"));
+}
+
+static void test_warning(void **state) {
+    (void)state;
+    static const char text[] =
+        "morphplan: 1\nstructure: {nodes: [4, 4], spacing: 0.1}\n"
+        "target: {shape: box, size: [0.1, 0.1, 0.1], at: [0, -1, 0.05]}\n";
+    morph_scene *scene;
+    int warnings = 0;
+    assert_int_equal(morph_scene_parse("s.yaml", text, strlen(text), NULL, count_warning, &warnings, &scene),
+                     MORPH_OK);
+    assert_int_equal(warnings, 1);
+    morph_scene_destroy(scene);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_defaults), cmocka_unit_test(test_every_key),
@@ -505,6 +523,7 @@ int main(void) {
         cmocka_unit_test(test_numbers),  cmocka_unit_test(test_number_grammar),
         cmocka_unit_test(test_locale),   cmocka_unit_test(test_files),
         cmocka_unit_test(test_examples), cmocka_unit_test(test_shared_models),
+        cmocka_unit_test(test_warning),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -574,32 +574,13 @@ static void test_missing_files(void **state) {
     assert_non_null(strstr(faults.text[2], "larger than 1 MiB"));
 }
 
-static void count_warning(void *user, const char *line) {
-    (void)user;
-    faults.count++;
-    assert_non_null(strstr(line, "s.yaml:3: target.at: the target lies beside the grid (in y)"));
-}
-
-static void test_warning(void **state) {
-    (void)state;
-    static const char text[] =
-        "morphplan: 1\nstructure: {nodes: [4, 4], spacing: 0.1}\n"
-        "target: {shape: box, size: [0.1, 0.1, 0.1], at: [0, -1, 0.05]}\n";
-    morph_scene *scene;
-    faults.count = 0;
-    assert_int_equal(morph_scene_parse("s.yaml", text, strlen(text), NULL, count_warning, NULL, &scene),
-                     MORPH_OK);
-    assert_int_equal(faults.count, 1);
-    morph_scene_destroy(scene);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_control),       cmocka_unit_test(test_cases),
         cmocka_unit_test(test_sections),      cmocka_unit_test(test_shapes),
         cmocka_unit_test(test_all_at_once),   cmocka_unit_test(test_syntax),
         cmocka_unit_test(test_hostile),       cmocka_unit_test(test_many_faults),
-        cmocka_unit_test(test_missing_files), cmocka_unit_test(test_warning),
+        cmocka_unit_test(test_missing_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
