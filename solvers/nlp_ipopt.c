@@ -283,7 +283,8 @@ morph_code_kind morph_ipopt_code(int code, const char **text) {
 /* Ipopt's console. 3.11 prints the name of the option file before it has read print_level, and complains
  * about refused options, on the stdout of the moment when the problem is created. So a stream of our own
  * stands in for stdout just then; the problem keeps it, and nothing reaches the real one. (glibc documents
- * stdout as a variable that may be set.) The same when the problem is freed: Ipopt closes its console unless that is stdout. */
+ * stdout as a variable that may be set.) The same when the problem is freed: Ipopt closes its console unless
+ * that is stdout. */
 typedef struct console {
     FILE *stream;
     char *text;
