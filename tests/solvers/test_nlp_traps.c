@@ -1,5 +1,6 @@
 /* What is known to go wrong with Ipopt and MUMPS, provoked: option files, numbers that are not finite, stops
  * and limits, repeats, threads, a process that dies inside the solver. */
+#include "test_nlp_grid.h"
 #include "test_nlp_problems.h"
 
 #include <setjmp.h>
@@ -116,6 +117,29 @@ static void repeats_are_bit_identical(void **state) {
         morph_nlp_result_free(&again);
     }
     morph_nlp_result_free(&first);
+}
+
+/* Large enough for orderings that draw random numbers, which then differ from one solve to the next within a
+ * process. A few iterations show it. */
+static void large_repeats_are_bit_identical(void **state) {
+    (void)state;
+    grid g;
+    morph_block blocks[2];
+    assert_true(grid_init(&g, 32));
+    grid_blocks(&g, blocks);
+    morph_nlp_options o = morph_nlp_defaults();
+    o.max_iterations = 4;
+    morph_nlp_result r[3] = {{0}};
+    for (int k = 0; k < 3; k++) {
+        morph_nlp *nlp = create(3 * g.points, g.x0, NULL, NULL, blocks, 2);
+        assert_int_equal(morph_nlp_solve(nlp, g.x0, &o, &r[k]), MORPH_OK);
+        assert_int_equal(r[k].iterations, 4);
+        morph_nlp_destroy(nlp);
+        if (k > 0) assert_same(&r[0], &r[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        morph_nlp_result_free(&r[k]);
+    grid_free(&g);
 }
 
 /* ------------------------------------------------------------------ numbers */
@@ -580,6 +604,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(option_file_changes_nothing),
         cmocka_unit_test(repeats_are_bit_identical),
+        cmocka_unit_test(large_repeats_are_bit_identical),
         cmocka_unit_test(nan_in_derivatives),
         cmocka_unit_test(nan_in_values),
         cmocka_unit_test(nan_outside_a_domain),
