@@ -29,6 +29,12 @@ static bool all_finite(const double *v, int n) {
     return sum == 0.0;
 }
 
+/* v may be NULL when there is nothing to fill, as in a problem without second derivatives. */
+static void fill_zero(double *v, int n) {
+    for (int i = 0; i < n; i++)
+        v[i] = 0;
+}
+
 morph_status morph_nlp_objective_at(morph_nlp *nlp, const double *x) {
     move_to(nlp, x);
     if (nlp->has_objective) return MORPH_OK;
@@ -87,7 +93,7 @@ static morph_status walk(morph_nlp *nlp, const morph_nlp_block *b, const double 
 morph_status morph_nlp_gradient_at(morph_nlp *nlp, const double *x) {
     move_to(nlp, x);
     if (nlp->has_gradient) return MORPH_OK;
-    memset(nlp->gradient, 0, (size_t)nlp->unknowns * sizeof *nlp->gradient);
+    fill_zero(nlp->gradient, nlp->unknowns);
     for (int k = 0; k < nlp->block_count; k++) {
         const morph_nlp_block *b = &nlp->blocks[k];
         if (b->first_row >= 0) continue;
@@ -102,7 +108,7 @@ morph_status morph_nlp_gradient_at(morph_nlp *nlp, const double *x) {
 morph_status morph_nlp_jacobian_at(morph_nlp *nlp, const double *x) {
     move_to(nlp, x);
     if (nlp->has_jacobian) return MORPH_OK;
-    memset(nlp->jacobian_value, 0, (size_t)nlp->jacobian.count * sizeof *nlp->jacobian_value);
+    fill_zero(nlp->jacobian_value, nlp->jacobian.count);
     for (int k = 0; k < nlp->block_count; k++) {
         const morph_nlp_block *b = &nlp->blocks[k];
         if (b->first_row < 0) continue;
@@ -123,7 +129,7 @@ static bool all_zero(const double *v, int n) {
 morph_status morph_nlp_hessian_at(morph_nlp *nlp, const double *x, double factor, const double *multiplier,
                                   double *values) {
     move_to(nlp, x);
-    memset(values, 0, (size_t)nlp->hessian.count * sizeof *values);
+    fill_zero(values, nlp->hessian.count);
     for (int k = 0; k < nlp->block_count; k++) {
         const morph_nlp_block *b = &nlp->blocks[k];
         const double *weight = b->first_row < 0 ? &factor : multiplier + b->first_row;

@@ -6,8 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* MUMPS orderings: 0 AMD, 2 AMF, 3 SCOTCH, 4 PORD, 5 METIS, 6 QAMD, 7 automatic. */
-enum { MORPH_PIVOT_ORDER = 5 };
+/* MUMPS orderings: 0 AMD, 2 AMF, 3 SCOTCH, 4 PORD, 5 METIS, 6 QAMD, 7 automatic. SCOTCH and METIS draw random
+ * numbers (a MUMPS without METIS falls back to the others), so that a second solve in one process differs
+ * from the first on grids of 3000 unknowns; PORD ends the process on some small problems. AMD and QAMD repeat
+ * and are as fast there as the others within 15 %; QAMD copes with dense rows, as of an unknown that every
+ * row shares. */
+enum { MORPH_PIVOT_ORDER = 6 };
 
 /* Ipopt takes bounds beyond 1e19 for none. */
 static const double no_bound = 2e19;
@@ -98,7 +102,7 @@ static morph_ip_bool eval_g(int n, double *x, morph_ip_bool new_x, int m, double
     const double begin = morph_seconds();
     const morph_status status = morph_nlp_rows_at(s->nlp, x);
     if (status == MORPH_OK) {
-        memcpy(rows, s->nlp->row_value, (size_t)m * sizeof *rows);
+        if (m > 0) memcpy(rows, s->nlp->row_value, (size_t)m * sizeof *rows);
         note_point(s, x);
     }
     return ended(s, begin, status);
@@ -110,6 +114,14 @@ static int jacobian_entries(const morph_nlp *nlp) {
     return nlp->rows > 0 && nlp->jacobian.count == 0 ? 1 : nlp->jacobian.count;
 }
 
+/* The arrays may be NULL when there is nothing to copy. */
+static void copy_pattern(const morph_pattern *p, int *row, int *column) {
+    for (int k = 0; k < p->count; k++) {
+        row[k] = p->row[k];
+        column[k] = p->column[k];
+    }
+}
+
 static morph_ip_bool eval_jac_g(int n, double *x, morph_ip_bool new_x, int m, int count, int *row,
                                 int *column, double *values, void *user) {
     (void)n;
@@ -118,17 +130,18 @@ static morph_ip_bool eval_jac_g(int n, double *x, morph_ip_bool new_x, int m, in
     session *s = user;
     const morph_pattern *p = &s->nlp->jacobian;
     if (!values) {
-        row[0] = column[0] = 0;
-        memcpy(row, p->row, (size_t)p->count * sizeof *row);
-        memcpy(column, p->column, (size_t)p->count * sizeof *column);
-        return count == jacobian_entries(s->nlp);
+        if (count != jacobian_entries(s->nlp)) return false;
+        if (count > p->count) row[0] = column[0] = 0;
+        copy_pattern(p, row, column);
+        return true;
     }
     if (given_up(s)) return false;
     const double begin = morph_seconds();
     const morph_status status = morph_nlp_jacobian_at(s->nlp, x);
     if (status == MORPH_OK) {
-        values[0] = 0;
-        memcpy(values, s->nlp->jacobian_value, (size_t)p->count * sizeof *values);
+        if (count > p->count) values[0] = 0;
+        for (int k = 0; k < p->count; k++)
+            values[k] = s->nlp->jacobian_value[k];
     }
     return ended(s, begin, status);
 }
@@ -143,9 +156,9 @@ static morph_ip_bool eval_h(int n, double *x, morph_ip_bool new_x, double factor
     session *s = user;
     const morph_pattern *p = &s->nlp->hessian;
     if (!values) {
-        memcpy(row, p->row, (size_t)p->count * sizeof *row);
-        memcpy(column, p->column, (size_t)p->count * sizeof *column);
-        return count == p->count;
+        if (count != p->count) return false;
+        copy_pattern(p, row, column);
+        return true;
     }
     if (given_up(s)) return false;
     const double begin = morph_seconds();
@@ -283,7 +296,8 @@ morph_code_kind morph_ipopt_code(int code, const char **text) {
 /* Ipopt's console. 3.11 prints the name of the option file before it has read print_level, and complains
  * about refused options, on the stdout of the moment when the problem is created. So a stream of our own
  * stands in for stdout just then; the problem keeps it, and nothing reaches the real one. (glibc documents
- * stdout as a variable that may be set.) The same when the problem is freed: Ipopt closes its console unless that is stdout. */
+ * stdout as a variable that may be set.) The same when the problem is freed: Ipopt closes its console unless
+ * that is stdout. */
 typedef struct console {
     FILE *stream;
     char *text;

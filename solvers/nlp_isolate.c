@@ -129,6 +129,7 @@ void morph_run_isolated(morph_nlp *nlp, const morph_nlp_options *options, morph_
     if (shared->finished) return;
     if (killed) {
         shared->status = MORPH_OK;
+        shared->code = 5; /* as if the iteration callback had ended it */
         shared->stopped = shared->stop_request != 0;
         shared->limit = !shared->stopped;
         return;

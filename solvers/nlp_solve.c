@@ -70,6 +70,7 @@ void morph_run_layout(morph_run *run, int unknowns, int rows) {
     run->upper_multiplier = 4 * n;
     run->row_multiplier = 5 * n;
     run->best_current = -1;
+    run->code = -199; /* until the solver says better */
 }
 
 static morph_status start_run(const morph_nlp *nlp, const double *x0, const morph_nlp_options *o,
@@ -249,6 +250,7 @@ static bool all_fixed(const morph_nlp *nlp) {
 /* Nothing to decide: the only point is the answer, and Ipopt would refuse the problem. */
 static void run_fixed(const morph_nlp *nlp, morph_run *run) {
     memcpy(morph_run_array(run, run->x), nlp->lower, (size_t)nlp->unknowns * sizeof *nlp->lower);
+    run->code = 0;
     run->fixed = run->finished = true;
 }
 
