@@ -196,5 +196,7 @@ morph_status morph_import_claims(const char *ending, const char *data, size_t *s
     if (strcmp(ending, "stl") == 0) return stl_claims(data, size, sentence);
     if (strcmp(ending, "off") == 0) return off_claims(data, *size, sentence);
     if (strcmp(ending, "ply") == 0) return morph_import_ply_claims(data, *size, sentence);
+    if (strcmp(ending, "gltf") == 0) return morph_import_gltf_claims(data, *size, false, sentence);
+    if (strcmp(ending, "glb") == 0) return morph_import_gltf_claims(data, *size, true, sentence);
     return MORPH_OK;
 }

@@ -284,7 +284,7 @@ static morph_status gather_scene(const struct aiScene *scene, gather *g) {
 
 /* ---- the whole ---- */
 
-static const char *const ENDINGS[] = {"stl", "obj", "ply", "off", "gltf", "glb", "dae"};
+static const char *const ENDINGS[] = {"stl", "obj", "ply", "off", "gltf", "glb"};
 
 /* The path's ending in lower case, or "". */
 static void ending_of(const char *path, char out[8]) {
@@ -302,10 +302,10 @@ static morph_status check_ending(const char *ending, const morph_sentence *to) {
     if (strcmp(ending, "msh") == 0)
         return morph_refuse(to,
                             "'%s' is a Gmsh file, which is not read; targets are surface meshes: STL, OBJ, "
-                            "PLY, OFF, glTF or Collada",
+                            "PLY, OFF or glTF",
                             to->name);
     return morph_refuse(to,
-                        "'%s' is no mesh file by its ending; .stl, .obj, .ply, .off, .gltf, .glb and .dae "
+                        "'%s' is no mesh file by its ending; .stl, .obj, .ply, .off, .gltf and .glb "
                         "are read",
                         to->name);
 }

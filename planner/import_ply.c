@@ -58,7 +58,8 @@ static bool read_property(const char **p, const char *end, header *h) {
     if (e->properties == MOST_PROPERTIES) return false;
     property q = {0, 0};
     if (strcmp(w, "list") == 0) {
-        if (!word(p, end, w) || (q.count = type_size(w)) == 0) return false;
+        /* Counts are whole numbers. */
+        if (!word(p, end, w) || (q.count = type_size(w)) == 0 || w[0] == 'f' || w[0] == 'd') return false;
         if (!word(p, end, w)) return false;
     }
     if ((q.size = type_size(w)) == 0) return false;
@@ -108,7 +109,7 @@ static const char *read_header(const char *data, const char *end, header *h, int
     return NULL;
 }
 
-/* A list's count of 1, 2 or 4 bytes; 8 (a double) is never sound. */
+/* A list's count of 1, 2 or 4 bytes; a negative one comes out huge. */
 static unsigned long long binary_count(const char *p, int bytes, format f) {
     unsigned long long n = 0;
     for (int i = 0; i < bytes; i++)

@@ -29,12 +29,14 @@ morph_refuse(const morph_sentence *to, const char *format, ...);
  * where it is missing, no regular file, empty, unreadable or beyond the limit. */
 morph_status morph_import_load(const char *path, const morph_sentence *sentence, char **data, size_t *size);
 
-/* Compares what the headers of STL, PLY and OFF claim, lists included, with the bytes that are there, before
- * anything is allocated by such a claim. ending: lower case, no dot; others pass. *size may shrink to the
- * bytes that belong to the mesh (a binary STL with something behind it). */
+/* Compares what the headers of STL, PLY, OFF and glTF claim, lists included, with the bytes that are there,
+ * before anything is allocated by such a claim. ending: lower case, no dot; others pass. *size may shrink to
+ * the bytes that belong to the mesh (a binary STL with something behind it). */
 morph_status morph_import_claims(const char *ending, const char *data, size_t *size,
                                  const morph_sentence *sentence);
 morph_status morph_import_ply_claims(const char *data, size_t size, const morph_sentence *sentence);
+morph_status morph_import_gltf_claims(const char *data, size_t size, bool binary,
+                                      const morph_sentence *sentence);
 
 /* The file's polygons as triangles, node transforms applied; vertices as the file has them (not welded).
  * *crossing: polygons that cross themselves, cut into a fan for want of anything better. */

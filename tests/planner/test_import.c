@@ -216,26 +216,6 @@ static void gltf_nodes_are_applied(void **state) {
                 2);
 }
 
-static void collada_is_read(void **state) {
-    (void)state;
-    assert_cube(
-        write_text(
-            "cube.dae",
-            "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" "
-            "version=\"1.4.1\"><asset><up_axis>Z_UP</up_axis></asset><library_geometries>"
-            "<geometry id=\"g\"><mesh><source id=\"p\"><float_array id=\"a\" count=\"24\">"
-            "0 0 0 2 0 0 0 2 0 2 2 0 0 0 2 2 0 2 0 2 2 2 2 2</float_array><technique_common>"
-            "<accessor source=\"#a\" count=\"8\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
-            "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor>"
-            "</technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" "
-            "source=\"#p\"/></vertices><polylist count=\"6\"><input semantic=\"VERTEX\" source=\"#v\" "
-            "offset=\"0\"/><vcount>4 4 4 4 4 4</vcount><p>0 2 3 1 4 5 7 6 0 1 5 4 2 6 7 3 0 4 6 2 1 3 7 5"
-            "</p></polylist></mesh></geometry></library_geometries><library_visual_scenes>"
-            "<visual_scene id=\"s\"><node><instance_geometry url=\"#g\"/></node></visual_scene>"
-            "</library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>"),
-        1);
-}
-
 /* ---- polygons, mending ---- */
 
 static void concave_polygons(void **state) {
@@ -520,9 +500,9 @@ static int setup(void **state) {
 
 static int teardown(void **state) {
     (void)state;
-    const char *names[] = {"cube.stl",   "cube.obj",  "cube.ply",   "cube.off",  "CUBE.OBJ", "binary.stl",
-                           "tail.stl",   "cube.bin",  "binary.ply", "cube.gltf", "cube.dae", "ell.obj",
-                           "inward.obj", "tetra.obj", "corner.obj", "table.csv", "flat.csv"};
+    const char *names[] = {"cube.stl",  "cube.obj",   "cube.ply",   "cube.off",  "CUBE.OBJ", "binary.stl",
+                           "tail.stl",  "cube.bin",   "binary.ply", "cube.gltf", "ell.obj",  "inward.obj",
+                           "tetra.obj", "corner.obj", "table.csv",  "flat.csv"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         remove(path_of(names[i]));
     return rmdir(folder);
@@ -533,7 +513,6 @@ int main(void) {
         cmocka_unit_test(text_formats),
         cmocka_unit_test(binary_formats),
         cmocka_unit_test(gltf_nodes_are_applied),
-        cmocka_unit_test(collada_is_read),
         cmocka_unit_test(concave_polygons),
         cmocka_unit_test(inside_out_is_turned),
         cmocka_unit_test(a_quad_with_two_equal_corners),

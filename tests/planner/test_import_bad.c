@@ -93,7 +93,7 @@ static void not_a_file(void **state) {
 
 static void empty_and_text_files(void **state) {
     (void)state;
-    const char *endings[] = {"stl", "obj", "ply", "off", "gltf", "glb", "dae"};
+    const char *endings[] = {"stl", "obj", "ply", "off", "gltf", "glb"};
     const char *prose =
         "This is a letter, not a mesh.\nIt has several lines of text, and some more, so that it "
         "is longer than the header of a binary file.\n";
@@ -190,6 +190,16 @@ static void false_gltf(void **state) {
         "b.gltf",
         "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"uri\":\"missing.bin\",\"byteLength\":12}]}",
         "'b.gltf'");
+    text_refused("cycle.gltf",
+                 "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
+                 "\"nodes\":[{\"children\":[1]},{\"children\":[0]}]}",
+                 "form no trees");
+    text_refused("one.gltf", "{\"asset\":{\"version\":\"1.0\"}}", "version 2");
+    text_refused("sparse.gltf",
+                 "{\"asset\":{\"version\":\"2.0\"},\"accessors\":[{\"componentType\":5126,"
+                 "\"count\":1000000000,\"type\":\"VEC3\"}]}",
+                 "claim more");
+    bytes_refused("d.glb", "glTF\2\0\0\0\xff\xff\xff\x7f\2\0\0\0JSON{}", 22, "claims 2147483647 bytes");
     bytes_refused("c.glb", "glTF\2\0\0\0\xff\xff\xff\x7f\xff\xff\xff\x7fJSON{}", 22, "'c.glb'");
 }
 
