@@ -89,9 +89,63 @@ static bool textual(const char *data, size_t size) {
     return true;
 }
 
+static const char *next_line(const char *p, const char *end) {
+    const char *stop = memchr(p, '\n', (size_t)(end - p));
+    return stop ? stop + 1 : end;
+}
+
 static uint32_t little32(const char *data) {
     const unsigned char *b = (const unsigned char *)data;
     return (uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+/* The first word of a line is `word`. *p moves behind it. */
+static bool starts(const char **p, const char *word) {
+    const char *q = *p;
+    while (*q == ' ' || *q == '\t')
+        q++;
+    const size_t n = strlen(word);
+    if (strncmp(q, word, n) != 0 || (q[n] && !isspace((unsigned char)q[n]))) return false;
+    *p = q + n;
+    return true;
+}
+
+/* Three words that look like numbers, on one line. */
+static bool three_numbers(const char *p) {
+    for (int k = 0; k < 3; k++) {
+        while (*p == ' ' || *p == '\t')
+            p++;
+        const char *q = p + (*p == '-' || *p == '+');
+        if (!isdigit((unsigned char)*q) && !(*q == '.' && isdigit((unsigned char)q[1]))) return false;
+        while (*p && !isspace((unsigned char)*p))
+            p++;
+    }
+    return true;
+}
+
+/* Text: solids of facets of three vertices. A file that stops in the middle would be read up to there. */
+static morph_status stl_text(const char *data, size_t size, const morph_sentence *to) {
+    const char *end = data + size;
+    bool inside = false;
+    int vertices = 0, line = 1;
+    for (const char *p = data; p < end; p = next_line(p, end), line++) {
+        const char *q = p;
+        if (starts(&q, "solid"))
+            inside = true;
+        else if (starts(&q, "endsolid"))
+            inside = false;
+        else if (starts(&q, "facet"))
+            vertices = 0;
+        else if (starts(&q, "vertex")) {
+            vertices++;
+            if (!three_numbers(q))
+                return morph_refuse(to, "'%s' is damaged: line %d has no three numbers", to->name, line);
+        } else if (starts(&q, "endfacet") && vertices != 3)
+            return morph_refuse(to, "'%s' is damaged: the facet that ends in line %d has %d vertices, not 3",
+                                to->name, line, vertices);
+    }
+    if (inside) return morph_refuse(to, "'%s' is truncated: its last 'endsolid' is missing", to->name);
+    return MORPH_OK;
 }
 
 /* Binary: 80 bytes of anything, the number of triangles, 50 bytes each. */
@@ -100,7 +154,7 @@ static morph_status stl_claims(const char *data, size_t *size, const morph_sente
         const char *p = data;
         while (isspace((unsigned char)*p))
             p++;
-        if (strncmp(p, "solid", 5) == 0) return MORPH_OK;
+        if (strncmp(p, "solid", 5) == 0) return stl_text(data, *size, to);
         return morph_refuse(to, "'%s' is text but no STL file: that begins with 'solid'", to->name);
     }
     if (*size < 84)
@@ -136,11 +190,6 @@ static const char *off_skip(const char *p, const char *end) {
     return p;
 }
 
-static const char *next_line(const char *p, const char *end) {
-    const char *stop = memchr(p, '\n', (size_t)(end - p));
-    return stop ? stop + 1 : end;
-}
-
 /* A count, or false where none stands there. */
 static bool off_count(const char **p, const char *end, unsigned long long *count) {
     *p = off_skip(*p, end);
@@ -151,10 +200,19 @@ static bool off_count(const char **p, const char *end, unsigned long long *count
     return true;
 }
 
+/* A face line: the number of corners, and as many numbers of vertices; colours may follow. */
+static bool off_face(const char *p, const char *end, unsigned long long vertices) {
+    unsigned long long corners, at;
+    if (!off_count(&p, end, &corners)) return false;
+    for (; corners > 0; corners--)
+        if (!off_count(&p, end, &at) || at >= vertices) return false;
+    return true;
+}
+
 /* "OFF" with prefixes, three counts, then a line for each vertex and each face. */
 static morph_status off_claims(const char *data, size_t size, const morph_sentence *to) {
     const char *end = data + size, *p = off_skip(data, end);
-    unsigned long long vertices, faces, edges, corners;
+    unsigned long long vertices, faces, edges;
     const char *word = p;
     while (p < end && isalnum((unsigned char)*p))
         p++;
@@ -181,11 +239,10 @@ static morph_status off_claims(const char *data, size_t size, const morph_senten
                                 "'%s' is truncated: its header claims %llu vertices and %llu faces, it "
                                 "ends after %llu of these lines",
                                 to->name, vertices, faces, i);
-        if (i >= vertices) {
-            if (!off_count(&p, end, &corners) || corners > (size_t)(end - p) / 2 + 1)
-                return morph_refuse(to, "'%s' is damaged: face %llu has no sound count of corners", to->name,
-                                    i - vertices);
-        }
+        if (i >= vertices && !off_face(p, next_line(p, end), vertices))
+            return morph_refuse(to,
+                                "'%s' is damaged: face %llu is no count and numbers of vertices below %llu",
+                                to->name, i - vertices, vertices);
         p = next_line(p, end);
     }
     return MORPH_OK;

@@ -108,6 +108,16 @@ static void empty_and_text_files(void **state) {
     text_refused("a.txt", prose, "no mesh file by its ending");
     text_refused("mesh", prose, "no mesh file by its ending");
     text_refused("torus.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "Gmsh");
+    text_refused("facet.stl",
+                 "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\nendfacet\n"
+                 "endsolid s\n",
+                 "has 2 vertices, not 3");
+    text_refused("word.stl", "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 zero 0\n", "line 4");
+    text_refused(
+        "cut.stl",
+        "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
+        "endfacet\n",
+        "'endsolid' is missing");
     text_refused("solid.stl", "solid but then nothing\n", "'solid.stl'");
 }
 
@@ -171,7 +181,8 @@ static void false_off_headers(void **state) {
     text_refused("a.off", "OFF\n1000000000 1 0\n0 0 0\n", "claims 1000000000 vertices");
     text_refused("b.off", "OFF\n3 1000000000 0\n0 0 0\n1 0 0\n0 1 0\n", "1000000000 faces");
     text_refused("c.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "ends after 4 of these lines");
-    text_refused("d.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n", "no sound count");
+    text_refused("d.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n", "face 0 is no count");
+    text_refused("g.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "face 0 is no count");
     text_refused("e.off", "OFF BINARY\n3 1 0\n", "binary OFF");
     text_refused("f.off", "OFF\nvertices\n", "no counts");
 }
