@@ -1,0 +1,130 @@
+/* Sections whose features come later: read and validated, then refused by name, so that nothing that a scene
+ * asks for is silently left out. */
+#include "planner/scene_parts.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const morph_range force_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "N"};
+static const morph_range moment_range = {0.0, 3600.0, false, "s"};
+static const morph_range place_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "m"};
+static const morph_range strength_range = {0.0, MORPH_SCENE_LARGEST, false, "N m2"};
+static const morph_range gap_range = {0.0, MORPH_SCENE_LARGEST, true, "m"};
+static const morph_range share_range = {0.0, 1.0, false, ""};
+
+/* A key that an entry must have. */
+static morph_value required(const morph_value *map, const char *key, const char *allowed) {
+    const morph_value value = morph_value_get(map, key);
+    if (!value.node) morph_value_fault(&value, "is missing, allowed: %s", allowed);
+    return value;
+}
+
+/* Entry i of a list of mappings; node NULL (and a fault) if it is none. */
+static morph_value entry(const morph_value *list, int i, const char *allowed) {
+    morph_value item = morph_value_item(list, i);
+    if (morph_value_is_map(&item)) {
+        morph_scene_check_keys(&item);
+    } else {
+        char is[80];
+        morph_value_describe(&item, is, sizeof is);
+        morph_value_fault(&item, "%s, allowed: a mapping of %s", is, allowed);
+        item.node = NULL;
+    }
+    return item;
+}
+
+static void read_touch_entry(const morph_scene_reader *r, const morph_value *touch) {
+    static const char *const layers[2] = {"bottom", "top"};
+    const int *n = r->scene->structure.nodes;
+    const long least[2] = {0, 0}, most[2] = {r->nodes_known ? n[0] - 1 : 63, r->nodes_known ? n[1] - 1 : 63};
+    long node[2];
+    double force[3], from = 0.0, to = 0.0;
+    int layer;
+    const morph_value where = required(touch, "node", "a list of 2 node numbers");
+    morph_value_integers(&where, least, most, 2, node);
+    const morph_value side = required(touch, "layer", "bottom, top");
+    morph_value_choice(&side, layers, 2, &layer);
+    const morph_value push = required(touch, "force", "a list of 3 numbers, N");
+    morph_value_numbers(&push, &force_range, 3, force);
+    const morph_value begin = required(touch, "from", "a time in s"),
+                      end = required(touch, "to", "a time in s");
+    const bool timed = morph_value_number(&begin, &moment_range, &from) == MORPH_FOUND;
+    if (morph_value_number(&end, &moment_range, &to) == MORPH_FOUND && timed && to <= from) {
+        char a[MORPH_NUMBER_TEXT], b[MORPH_NUMBER_TEXT];
+        morph_number_print(to, a);
+        morph_number_print(from, b);
+        morph_value_fault(&end, "%s is not after from, allowed: more than %s s", a, b);
+    }
+}
+
+void morph_scene_read_touch(morph_scene_reader *r, const morph_value *motion) {
+    const morph_value touch = morph_value_get(motion, "touch");
+    if (!touch.node || morph_value_is_empty(&touch)) return;
+    if (!morph_value_is_list(&touch)) {
+        char is[80];
+        morph_value_describe(&touch, is, sizeof is);
+        morph_value_fault(&touch, "%s, allowed: a list of mappings of node, layer, force, from, to", is);
+        return;
+    }
+    const int before = r->yaml.faults.count;
+    for (int i = 0; i < morph_value_count(&touch); i++) {
+        const morph_value item = entry(&touch, i, "node, layer, force, from, to");
+        if (item.node) read_touch_entry(r, &item);
+    }
+    if (r->yaml.faults.count == before && morph_value_count(&touch) > 0)
+        morph_value_later(&touch, "forces of a hand");
+}
+
+/* auto, none, or (not available yet) a list of centres. */
+static void read_attractors(morph_scene_reader *r, const morph_value *root) {
+    static const char *const names[2] = {"auto", "none"};
+    const morph_value attractors = morph_value_get(root, "attractors");
+    int chosen = 0;
+    if (!morph_value_is_list(&attractors)) {
+        morph_value_choice(&attractors, names, 2, &chosen);
+        r->scene->attractors = chosen ? MORPH_ATTRACT_NONE : MORPH_ATTRACT_AUTO;
+        return;
+    }
+    const int before = r->yaml.faults.count;
+    for (int i = 0; i < morph_value_count(&attractors); i++) {
+        const morph_value item = entry(&attractors, i, "at, strength");
+        if (!item.node) continue;
+        double at[3], strength;
+        const morph_value place = required(&item, "at", "a list of 3 numbers, m");
+        morph_value_numbers(&place, &place_range, 3, at);
+        const morph_value pull = required(&item, "strength", "a number, N m2");
+        morph_value_number(&pull, &strength_range, &strength);
+    }
+    if (morph_value_count(&attractors) == 0)
+        r->scene->attractors = MORPH_ATTRACT_NONE;
+    else if (r->yaml.faults.count == before)
+        morph_value_later(&attractors, "a list of centres");
+}
+
+static void read_start(const morph_value *root) {
+    const morph_value start = morph_value_get(root, "start");
+    char *text = NULL;
+    if (morph_value_text(&start, 4000, &text) != MORPH_FOUND) return;
+    if (strcmp(text, "flat") != 0) morph_value_later(&start, text);
+    free(text);
+}
+
+static void read_goal(morph_scene_reader *r, const morph_value *root) {
+    const morph_value goal = morph_scene_section(root, "goal");
+    const int before = r->yaml.faults.count;
+    double unused;
+    bool any = false;
+    const char *const keys[3] = {"mean_gap", "max_gap", "coverage"};
+    for (int k = 0; k < 3; k++) {
+        const morph_value value = morph_value_get(&goal, keys[k]);
+        any |= morph_value_number(&value, k < 2 ? &gap_range : &share_range, &unused) == MORPH_FOUND;
+    }
+    if (any && r->yaml.faults.count == before) morph_value_later(&goal, "limits on gap and coverage");
+}
+
+void morph_scene_read_extras(morph_scene_reader *r, const morph_value *root) {
+    read_attractors(r, root);
+    read_start(root);
+    read_goal(r, root);
+}

@@ -1,0 +1,221 @@
+/* The structure section: the grid, its links and their limits. */
+#include "planner/scene_parts.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+const char *const morph_layout_names[2] = {"posts", "offset"};
+const char *const morph_joint_type_names[2] = {"ball", "universal"};
+const char *const morph_bracing_names[3] = {"none", "web", "full"};
+const char *const morph_support_names[3] = {"base", "frame", "target"};
+
+/* Two nodes make one cell; beyond 64 no plan would end in useful time. */
+enum { NODES_LEAST = 2, NODES_MOST = 64 };
+
+/* Spacings from micrometres to megametres: everything else scales with it. */
+static const morph_range spacing_range = {1e-6, 1e6, false, "m"};
+static const morph_range length_range = {0.0, MORPH_SCENE_LARGEST, true, "m"};
+static const morph_range factor_range = {0.0, 1e3, true, "times the start length"};
+static const morph_range mass_range = {0.0, MORPH_SCENE_LARGEST, true, "kg"};
+static const morph_range rate_range = {0.0, MORPH_SCENE_LARGEST, true, "m/s"};
+static const morph_range acceleration_range = {0.0, MORPH_SCENE_LARGEST, true, "m/s2"};
+static const morph_range jerk_range = {0.0, MORPH_SCENE_LARGEST, true, "m/s3"};
+static const morph_range stiffness_range = {0.0, MORPH_SCENE_LARGEST, true, "N/m"};
+static const morph_range damping_range = {0.0, MORPH_SCENE_LARGEST, false, "N s/m"};
+static const morph_range angle_range = {0.0, 180.0, false, "degrees"};
+static const morph_range force_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "N"};
+
+static morph_found read_number(const morph_value *map, const char *key, const morph_range *range,
+                               double *out) {
+    const morph_value value = morph_value_get(map, key);
+    return morph_value_number(&value, range, out);
+}
+
+/* A choice of which only the first is available now; returns the index read (0 if absent or faulty). */
+static int read_first_only(const morph_value *map, const char *key, const char *const *names, int count) {
+    const morph_value value = morph_value_get(map, key);
+    int chosen = 0;
+    if (morph_value_choice(&value, names, count, &chosen) == MORPH_FOUND && chosen > 0)
+        morph_value_later(&value, names[chosen]);
+    return chosen;
+}
+
+static void require(const morph_value *value, const char *allowed) {
+    if (!value->node) morph_value_fault(value, "is missing, allowed: %s", allowed);
+}
+
+/* nodes and spacing, which have no default. */
+static void read_grid(morph_scene_reader *r, const morph_value *map) {
+    const long least[2] = {NODES_LEAST, NODES_LEAST}, most[2] = {NODES_MOST, NODES_MOST};
+    const morph_value nodes = morph_value_get(map, "nodes");
+    const morph_value spacing = morph_value_get(map, "spacing");
+    long n[2] = {NODES_LEAST, NODES_LEAST};
+    double distance = 1.0;
+    require(&nodes, "a list of 2, each a whole number from 2 to 64");
+    r->nodes_known = morph_value_integers(&nodes, least, most, 2, n) == MORPH_FOUND;
+    require(&spacing, "a number of at least 1e-06 and at most 1e+06 m");
+    r->spacing_known = morph_value_number(&spacing, &spacing_range, &distance) == MORPH_FOUND;
+
+    r->scene->structure = morph_structure_defaults(distance);
+    r->scene->structure.nodes[0] = (int)n[0];
+    r->scene->structure.nodes[1] = (int)n[1];
+}
+
+/* A pair of length limits; the start length must lie within, or the flat start breaks them. */
+static void read_limits(const morph_value *value, const morph_range *range, double start, const char *what,
+                        double out[2]) {
+    if (morph_value_pair(value, range, out) != MORPH_FOUND) return;
+    if (isnan(start) || (start >= out[0] && start <= out[1])) return;
+    char text[3][MORPH_NUMBER_TEXT];
+    morph_number_print(out[0], text[0]);
+    morph_number_print(out[1], text[1]);
+    morph_number_print(start, text[2]);
+    morph_value_fault(value, "[%s, %s] leaves out the start length %s, allowed: a range that holds %s",
+                      text[0], text[1], text[2], what);
+}
+
+static void read_lengths(morph_scene_reader *r, const morph_value *link) {
+    morph_structure_def *def = &r->scene->structure;
+    const double start = r->spacing_known ? def->spacing : NAN;
+    morph_value length = morph_value_get(link, "length");
+    if (!length.node) return;
+    if (morph_value_is_map(&length)) {
+        morph_scene_check_keys(&length);
+        const morph_value bottom = morph_value_get(&length, "bottom");
+        const morph_value top = morph_value_get(&length, "top");
+        const morph_value brace = morph_value_get(&length, "brace");
+        read_limits(&bottom, &length_range, start, "structure.spacing", def->length[MORPH_LINK_BOTTOM]);
+        read_limits(&top, &length_range, start, "structure.spacing", def->length[MORPH_LINK_TOP]);
+        read_limits(&brace, &factor_range, 1.0, "1 (times the start length)", def->length[MORPH_LINK_BRACE]);
+    } else if (morph_value_is_list(&length)) {
+        read_limits(&length, &length_range, start, "structure.spacing", def->length[MORPH_LINK_BOTTOM]);
+        for (int k = 0; k < 2; k++)
+            def->length[MORPH_LINK_TOP][k] = def->length[MORPH_LINK_BOTTOM][k];
+    } else {
+        char is[80];
+        morph_value_describe(&length, is, sizeof is);
+        morph_value_fault(
+            &length, "%s, allowed: a pair [shortest, longest] in m, or a mapping of bottom, top, brace", is);
+    }
+}
+
+/* force and stuck: understood, not available yet. */
+static void read_later_link_keys(morph_scene_reader *r, const morph_value *link) {
+    const morph_value force = morph_value_get(link, "force");
+    double pair[2];
+    if (morph_value_pair(&force, &force_range, pair) == MORPH_FOUND) {
+        if (pair[0] > 0.0 || pair[1] < 0.0)
+            morph_value_fault(&force,
+                              "leaves out 0, allowed: push (at most 0) first, then pull (at least 0), in N");
+        else
+            morph_value_later(&force, "limits of push and pull");
+    }
+
+    const morph_value stuck = morph_value_get(link, "stuck");
+    if (!stuck.node) return;
+    if (!morph_value_is_list(&stuck)) {
+        char is[80];
+        morph_value_describe(&stuck, is, sizeof is);
+        morph_value_fault(&stuck, "%s, allowed: a list of link numbers", is);
+        return;
+    }
+    /* Links of both layers: 2 (2 nx ny - nx - ny), without braces, which are not available either. */
+    const int *n = r->scene->structure.nodes;
+    const long links = r->nodes_known ? 2L * (2L * n[0] * n[1] - n[0] - n[1]) : 1000000L;
+    bool good = true;
+    for (int i = 0; i < morph_value_count(&stuck); i++) {
+        const morph_value item = morph_value_item(&stuck, i);
+        long number;
+        if (morph_value_integer(&item, 0, links - 1, &number) != MORPH_FOUND) good = false;
+    }
+    if (good && morph_value_count(&stuck) > 0)
+        morph_value_later(&stuck, "links that hold their start length");
+}
+
+static void read_link(morph_scene_reader *r, const morph_value *structure) {
+    const morph_value link = morph_scene_section(structure, "link");
+    morph_structure_def *def = &r->scene->structure;
+    read_lengths(r, &link);
+    read_number(&link, "radius", &length_range, &def->radius);
+    read_number(&link, "rate", &rate_range, &def->rate);
+    read_number(&link, "acceleration", &acceleration_range, &def->acceleration);
+    read_number(&link, "jerk", &jerk_range, &def->jerk);
+    read_number(&link, "stiffness", &stiffness_range, &def->stiffness);
+    read_number(&link, "damping", &damping_range, &def->damping);
+    read_later_link_keys(r, &link);
+
+    /* Neighbouring parallel links, and the two links of a panel, must not touch at the flat start. */
+    const bool by_height = def->thickness < def->spacing;
+    const double room = by_height ? def->thickness : def->spacing;
+    if (!r->spacing_known || 2.0 * def->radius < room) return;
+    morph_value at = morph_value_get(&link, "radius");
+    if (!at.node) at = morph_value_get(structure, by_height ? "thickness" : "spacing");
+    char radius[MORPH_NUMBER_TEXT], half[MORPH_NUMBER_TEXT];
+    morph_number_print(def->radius, radius);
+    morph_number_print(0.5 * room, half);
+    morph_value_fault(&at,
+                      "links of radius %s touch at the start, allowed: a radius below half the %s (%s m)",
+                      radius, by_height ? "thickness" : "spacing", half);
+}
+
+/* Limits in degrees to radians; the flat start has 90 degrees everywhere. */
+static void read_angle(const morph_value *angle, const char *key, double out[2]) {
+    const morph_value value = morph_value_get(angle, key);
+    double degrees[2];
+    if (morph_value_pair(&value, &angle_range, degrees) != MORPH_FOUND) return;
+    if (degrees[0] > 90.0 || degrees[1] < 90.0) {
+        char lo[MORPH_NUMBER_TEXT], hi[MORPH_NUMBER_TEXT];
+        morph_number_print(degrees[0], lo);
+        morph_number_print(degrees[1], hi);
+        morph_value_fault(
+            &value, "[%s, %s] leaves out 90, the angle at the start, allowed: a range that holds 90", lo, hi);
+        return;
+    }
+    for (int k = 0; k < 2; k++)
+        out[k] = morph_radians(degrees[k]);
+}
+
+/* none, or (not available yet) border, corners, a list of nodes. */
+static void read_fixed(morph_scene_reader *r, const morph_value *structure) {
+    static const char *const names[3] = {"none", "border", "corners"};
+    const morph_value fixed = morph_value_get(structure, "fixed");
+    int chosen = 0;
+    if (!morph_value_is_list(&fixed)) {
+        if (!morph_value_is(&fixed, "none") && morph_value_choice(&fixed, names, 3, &chosen) == MORPH_FOUND)
+            morph_value_later(&fixed, names[chosen]);
+        return;
+    }
+    const int *n = r->scene->structure.nodes;
+    const long least[2] = {0, 0};
+    const long most[2] = {r->nodes_known ? n[0] - 1 : NODES_MOST - 1,
+                          r->nodes_known ? n[1] - 1 : NODES_MOST - 1};
+    bool good = true;
+    for (int i = 0; i < morph_value_count(&fixed); i++) {
+        const morph_value item = morph_value_item(&fixed, i);
+        long node[2];
+        if (morph_value_integers(&item, least, most, 2, node) != MORPH_FOUND) good = false;
+    }
+    if (good && morph_value_count(&fixed) > 0) morph_value_later(&fixed, "a list of nodes");
+}
+
+void morph_scene_read_structure(morph_scene_reader *r, const morph_value *root) {
+    const morph_value map = morph_scene_section(root, "structure");
+    const morph_value whole = morph_value_get(root, "structure");
+    if (whole.node && !map.node && !morph_value_is_empty(&whole)) {
+        r->scene->structure = morph_structure_defaults(1.0); /* said already: not its keys one by one */
+        return;
+    }
+    morph_structure_def *def = &r->scene->structure;
+    read_grid(r, &map);
+    def->layout = (morph_layout)read_first_only(&map, "layout", morph_layout_names, 2);
+    def->joints = (morph_joint_type)read_first_only(&map, "joints", morph_joint_type_names, 2);
+    def->bracing = (morph_bracing)read_first_only(&map, "bracing", morph_bracing_names, 3);
+    def->support = (morph_support)read_first_only(&map, "support", morph_support_names, 3);
+    read_number(&map, "thickness", &length_range, &def->thickness);
+    read_number(&map, "mass", &mass_range, &def->mass);
+    read_fixed(r, &map);
+    read_link(r, &map);
+    const morph_value angle = morph_scene_section(&map, "angle");
+    read_angle(&angle, "link_post", def->link_post);
+    read_angle(&angle, "link_link", def->link_link);
+}
