@@ -1,0 +1,123 @@
+/* The constraint and objective blocks of a pose. A pose is 3*joints coordinates in units of the grid spacing
+ * ("scaled"), so every row is of order 1. Every block sees a whole pose as its local unknowns; in a path the
+ * assembler shifts it to its own pose.
+ *
+ * A block's data is plain and owned by its user; make functions fill a morph_block that refers to that data,
+ * to `unknown` (local -> global, NULL for identity) and to `lower`, `upper` (rows entries each, filled by the
+ * make function). */
+#ifndef MORPH_BLOCKS_H
+#define MORPH_BLOCKS_H
+
+#include "model/cavity.h"
+#include "model/sdf.h"
+#include "model/structure.h"
+#include "solvers/nlp.h"
+
+/* |p|^2 / h^2 = 1 for every post. rows: posts. */
+typedef struct morph_post_rows {
+    const morph_structure *structure;
+} morph_post_rows;
+morph_block morph_block_posts(morph_post_rows *data, const int *unknown, double *lower, double *upper);
+
+/* min <= length <= max of the listed links, as rows |d|^2 / a^2. margin: taken off both limits, in spacings.
+ */
+typedef struct morph_length_rows {
+    const morph_structure *structure;
+    int count;
+    const int *link;
+    double margin;
+} morph_length_rows;
+morph_block morph_block_lengths(morph_length_rows *data, const int *unknown, double *lower, double *upper);
+
+/* Angle limits of the listed tuples as rows cos(angle): tuple t < link_posts is link to post t, else link to
+ * link t - link_posts. margin: taken off both limits, radians. */
+typedef struct morph_angle_rows {
+    const morph_structure *structure;
+    int count;
+    const int *tuple;
+    double margin;
+} morph_angle_rows;
+morph_block morph_block_angles(morph_angle_rows *data, const int *unknown, double *lower, double *upper);
+/* Joints of the two directions of a tuple in that numbering, and its limits. */
+void morph_angle_joints(const morph_structure *s, int tuple, int uj[2], int vj[2]);
+const double *morph_angle_limit(const morph_structure *s, int tuple);
+/* The angle at x (any unit), radians, and its element's name. */
+double morph_angle_at(const morph_structure *s, int tuple, const double *x);
+void morph_angle_name(const morph_structure *s, int tuple, char *text, size_t size);
+
+/* A point of the structure: up to three joints with weights that sum to 1. */
+typedef struct morph_point {
+    int joint[3];
+    double weight[3];
+    int link;    /* the link that it lies on, or -1: a skin point */
+    double bias; /* exact distance minus smooth distance where last measured, spacings */
+} morph_point;
+void morph_point_name(const morph_structure *s, const morph_point *p, char *text, size_t size);
+void morph_point_at(const morph_point *p, const double *x, double out[3]);
+
+/* Smooth distance + bias >= radius + margin at the listed points, in spacings. */
+typedef struct morph_clearance_rows {
+    const morph_structure *structure;
+    const morph_sdf *sdf;
+    int count;
+    const morph_point *point;
+    double margin;
+} morph_clearance_rows;
+morph_block morph_block_clearance(morph_clearance_rows *data, const int *unknown, double *lower,
+                                  double *upper);
+
+/* Two axes (links or posts) kept apart at fixed parameters: |P - Q|^2 >= (sum of radii + margin)^2. */
+typedef struct morph_pair {
+    int joint[4];     /* a0, a1, b0, b1 */
+    double weight[4]; /* 1-s, s, -(1-t), -t */
+    double distance;  /* least distance allowed between the axes, spacings */
+    int axis[2];      /* link number, or links + post number */
+} morph_pair;
+typedef struct morph_separation_rows {
+    const morph_structure *structure;
+    int count;
+    const morph_pair *pair;
+    double margin;
+} morph_separation_rows;
+morph_block morph_block_separation(morph_separation_rows *data, const int *unknown, double *lower,
+                                   double *upper);
+void morph_axis_name(const morph_structure *s, int axis, char *text, size_t size);
+
+/* Objective: sum A_q gap_q^2 over skin samples, gap = smooth min(distance, height above base) - radius, all
+ * in spacings. The kink between target and base plane is rounded over `blend` spacings. */
+typedef struct morph_gap_term {
+    const morph_cavity *cavity;
+    const morph_sdf *sdf;
+    double blend;
+    double scale;
+} morph_gap_term;
+morph_block morph_block_gap(morph_gap_term *data, const int *unknown);
+
+/* Objective: sum over exposed points of A_y |W x - y|^2 split along the target's normal n and across it:
+ * (n.(W x - y) - r)^2 + slide |(I - n n^T)(W x - y)|^2. Closest skin points W are fixed. */
+typedef struct morph_cover_term {
+    const morph_cavity *cavity;
+    const int (*joint)[3]; /* exposed entries */
+    const double (*weight)[3];
+    double slide, scale;
+} morph_cover_term;
+morph_block morph_block_cover(morph_cover_term *data, const int *unknown);
+
+/* Objective: scale * sum |x_i - reference_i|^2 over all coordinates; both scaled. */
+typedef struct morph_near_term {
+    int coordinates;
+    const double *reference;
+    double scale;
+} morph_near_term;
+morph_block morph_block_near(morph_near_term *data, const int *unknown);
+
+/* Objective: scale * sum over links (|d|^2 - target^2)^2 / 4, about the squared deviation of the length from
+ * `target` near length 1. */
+typedef struct morph_stretch_term {
+    const morph_structure *structure;
+    const double *target; /* links, spacings */
+    double scale;
+} morph_stretch_term;
+morph_block morph_block_stretch(morph_stretch_term *data, const int *unknown);
+
+#endif

@@ -1,0 +1,422 @@
+#include "planner/pose.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *morph_limit_name(morph_limit limit) {
+    switch (limit) {
+    case MORPH_LIMIT_POST:
+        return "post length";
+    case MORPH_LIMIT_LENGTH:
+        return "length";
+    case MORPH_LIMIT_ANGLE:
+        return "angle";
+    case MORPH_LIMIT_CLEARANCE:
+        return "clearance";
+    case MORPH_LIMIT_BASE:
+        return "base";
+    case MORPH_LIMIT_SELF:
+        return "self clearance";
+    case MORPH_LIMITS:
+        break;
+    }
+    return "unknown";
+}
+
+morph_status morph_active_create(const morph_structure *s, morph_active **out) {
+    *out = NULL;
+    morph_active *a = calloc(1, sizeof *a);
+    if (!a) return MORPH_ERR_NOMEM;
+    const size_t tuples = (size_t)(s->link_posts + s->link_links);
+    a->link = morph_alloc((size_t)s->links, sizeof(int));
+    a->has_link = morph_alloc((size_t)s->links, sizeof(bool));
+    a->tuple = morph_alloc(tuples, sizeof(int));
+    a->has_tuple = morph_alloc(tuples, sizeof(bool));
+    if (!a->link || !a->has_link || !a->tuple || !a->has_tuple) {
+        morph_active_destroy(a);
+        return MORPH_ERR_NOMEM;
+    }
+    *out = a;
+    return MORPH_OK;
+}
+
+void morph_active_destroy(morph_active *a) {
+    if (!a) return;
+    free(a->link);
+    free(a->has_link);
+    free(a->tuple);
+    free(a->has_tuple);
+    free(a->point);
+    free(a->pair);
+    free(a->lower);
+    free(a->upper);
+    free(a);
+}
+
+int morph_active_rows(const morph_active *a, const morph_structure *s) {
+    return s->posts + a->links + a->tuples + a->points + a->pairs;
+}
+
+int morph_possible_rows(const morph_structure *s) {
+    const long axes = s->links + s->posts;
+    /* Clearance: each skin triangle, each link, each joint once; pairs: every two axes. */
+    const long all = s->posts + s->links + s->link_posts + s->link_links + s->skin_triangles + s->links +
+                     s->joints + axes * (axes - 1) / 2;
+    return (int)all;
+}
+
+static bool grow(void **array, int *capacity, int need, size_t size) {
+    if (need <= *capacity) return true;
+    int next = *capacity ? 2 * *capacity : 64;
+    while (next < need)
+        next *= 2;
+    void *p = realloc(*array, (size_t)next * size);
+    if (!p) return false;
+    *array = p;
+    *capacity = next;
+    return true;
+}
+
+/* What one examination carries along. */
+typedef struct examiner {
+    const morph_world *world;
+    const double *x;
+    double *metres; /* x in metres, for the exact distances */
+    const morph_inset *inset;
+    const morph_nearness *near;
+    morph_active *active;
+    morph_violation *violation;
+    int added;
+    morph_status status;
+} examiner;
+
+static void note(examiner *e, morph_limit limit, double amount,
+                 void (*name)(const morph_structure *, int, char *, size_t), int element) {
+    morph_violation *v = e->violation;
+    if (amount <= v->amount[limit]) return;
+    v->amount[limit] = amount;
+    name(e->world->structure, element, v->element[limit], sizeof v->element[limit]);
+}
+
+static void examine_members(examiner *e) {
+    const morph_structure *s = e->world->structure;
+    for (int p = 0; p < s->posts; p++) {
+        const double h = morph_dist(&e->metres[3 * s->post[p][1]], &e->metres[3 * s->post[p][0]]);
+        note(e, MORPH_LIMIT_POST, fabs(h / s->post_length[p] - 1.0), morph_post_name, p);
+    }
+    for (int l = 0; l < s->links; l++) {
+        const double length = morph_dist(&e->x[3 * s->link[l][1]], &e->x[3 * s->link[l][0]]);
+        const double lo = s->length_limit[l][0] / s->spacing - length,
+                     hi = length - s->length_limit[l][1] / s->spacing;
+        const double beyond = lo > hi ? lo : hi;
+        note(e, MORPH_LIMIT_LENGTH, beyond, morph_link_name, l);
+        if (e->active && !e->active->has_link[l] && beyond > -e->inset->length - e->near->length) {
+            e->active->has_link[l] = true;
+            e->active->link[e->active->links++] = l;
+            e->added++;
+        }
+    }
+}
+
+static void examine_angles(examiner *e) {
+    const morph_structure *s = e->world->structure;
+    for (int t = 0; t < s->link_posts + s->link_links; t++) {
+        const double angle = morph_angle_at(s, t, e->x), *limit = morph_angle_limit(s, t);
+        const double lo = limit[0] - angle, hi = angle - limit[1], beyond = lo > hi ? lo : hi;
+        note(e, MORPH_LIMIT_ANGLE, beyond, morph_angle_name, t);
+        if (e->active && !e->active->has_tuple[t] && beyond > -e->inset->angle - e->near->angle) {
+            e->active->has_tuple[t] = true;
+            e->active->tuple[e->active->tuples++] = t;
+            e->added++;
+        }
+    }
+}
+
+/* A point is new when no row stands within `apart` of its weights on the same joints. */
+static bool is_new_point(const morph_active *a, const morph_point *p, double apart) {
+    for (int n = 0; n < a->points; n++) {
+        const morph_point *q = &a->point[n];
+        if (memcmp(p->joint, q->joint, sizeof p->joint) != 0) continue;
+        double far = 0.0;
+        for (int k = 0; k < 3; k++)
+            far = fmax(far, fabs(p->weight[k] - q->weight[k]));
+        if (far < apart) return false;
+    }
+    return true;
+}
+
+/* Zero weights are dropped and joints ordered, so that a point has one name whatever element found it. */
+static morph_point canonical(const morph_structure *s, const int *joint, const double *weight, int n) {
+    morph_point p = {.joint = {0, 0, 0}, .weight = {0.0, 0.0, 0.0}, .link = -1};
+    int kept = 0;
+    for (int a = 0; a < n; a++) {
+        if (weight[a] < 1e-9) continue;
+        int at = kept++;
+        for (; at > 0 && p.joint[at - 1] > joint[a]; at--) {
+            p.joint[at] = p.joint[at - 1];
+            p.weight[at] = p.weight[at - 1];
+        }
+        p.joint[at] = joint[a];
+        p.weight[at] = weight[a];
+    }
+    for (int a = kept; a < 3; a++)
+        p.joint[a] = p.joint[0];
+    for (int l = 0; kept == 2 && l < s->links; l++)
+        if (s->link[l][0] == p.joint[0] && s->link[l][1] == p.joint[1]) p.link = l;
+    return p;
+}
+
+static void add_point(examiner *e, const int *joint, const double *weight, int n, double apart) {
+    morph_active *a = e->active;
+    const morph_point p = canonical(e->world->structure, joint, weight, n);
+    if (!is_new_point(a, &p, apart)) return;
+    if (!grow((void **)&a->point, &a->point_capacity, a->points + 1, sizeof *a->point)) {
+        e->status = MORPH_ERR_NOMEM;
+        return;
+    }
+    a->point[a->points++] = p;
+    e->added++;
+}
+
+static void skin_name(const morph_structure *s, int t, char *text, size_t size) {
+    const int *n = s->joint_node[s->skin[t][0]];
+    snprintf(text, size, "skin triangle %d at (%d,%d)", t, n[0], n[1]);
+}
+
+/* One element (n = 2: link, 3: skin triangle): exact least distance; rows at its joints and at its deepest
+ * point where near. */
+static void examine_element(examiner *e, const int *joint, int n, int element) {
+    const morph_structure *s = e->world->structure;
+    const double a = s->spacing, r = s->def.radius / a;
+    const double reach = r + e->inset->clearance + (e->near ? e->near->clearance : 0.0);
+    /* The smooth distance at the middle bounds the element's from below: 1-Lipschitz, and off by less than a
+     * tenth of a spacing where the grid covers it; a further half spacing makes sure. */
+    double middle[3] = {0.0, 0.0, 0.0}, extent = 0.0;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            middle[k] += e->metres[3 * joint[i] + k] / n;
+    for (int i = 0; i < n; i++)
+        extent = fmax(extent, morph_dist(middle, &e->metres[3 * joint[i]]));
+    if ((morph_sdf_eval(e->world->sdf, middle, NULL, NULL) - extent) / a > fmax(reach, r) + 0.5) return;
+    double weight[3] = {0.0, 0.0, 0.0};
+    morph_closest c;
+    if (n == 2)
+        morph_distance_segment(e->world->exact, &e->metres[3 * joint[0]], &e->metres[3 * joint[1]], weight,
+                               &c);
+    else
+        morph_distance_triangle(e->world->exact, &e->metres[3 * joint[0]], &e->metres[3 * joint[1]],
+                                &e->metres[3 * joint[2]], weight, &c);
+    const double distance = c.distance / a;
+    note(e, MORPH_LIMIT_CLEARANCE, r - distance, n == 2 ? morph_link_name : skin_name, element);
+    if (!e->active || distance > reach) return;
+    for (int i = 0; i < n; i++) {
+        const double one = 1.0;
+        morph_closest v;
+        morph_distance_point_bounded(e->world->exact, &e->metres[3 * joint[i]], reach * a, &v);
+        if (v.distance < reach * a) add_point(e, &joint[i], &one, 1, 0.5);
+    }
+    /* A violated deepest point needs its own row unless one stands within a fraction of the radius (over
+     * which the clearance of a link across an edge changes little); an inside one only where nothing stands
+     * near. */
+    const bool violated = distance < r + e->inset->clearance;
+    add_point(e, joint, weight, n, violated ? fmin(0.02, 0.2 * r + 1e-3) : 0.15);
+}
+
+static void renew_bias(examiner *e) {
+    const double a = e->world->structure->spacing;
+    for (int n = 0; n < e->active->points; n++) {
+        morph_point *p = &e->active->point[n];
+        double at[3];
+        morph_closest c;
+        morph_point_at(p, e->metres, at);
+        const double smooth = morph_sdf_eval(e->world->sdf, at, NULL, NULL);
+        morph_distance_point_bounded(e->world->exact, at, 2.0 * a, &c);
+        /* Far points need no correction: their rows are idle. */
+        p->bias = fabs(c.distance) < a ? (c.distance - smooth) / a : 0.0;
+    }
+}
+
+static void examine_clearance(examiner *e) {
+    const morph_structure *s = e->world->structure;
+    for (int t = 0; t < s->skin_triangles; t++)
+        examine_element(e, s->skin[t], 3, t);
+    /* Links of the layer that carries the skin are edges of its triangles. */
+    for (int l = 0; l < s->links; l++)
+        if (s->link_kind[l] != MORPH_LINK_BOTTOM) examine_element(e, s->link[l], 2, l);
+    if (e->active) renew_bias(e);
+    for (int j = 0; j < s->joints && !isnan(e->world->base); j++)
+        note(e, MORPH_LIMIT_BASE, e->world->base / s->spacing - e->x[3 * j + 2], morph_joint_name, j);
+}
+
+static void axis_ends(const morph_structure *s, int axis, int ends[2]) {
+    const int *pair = axis < s->links ? s->link[axis] : s->post[axis - s->links];
+    ends[0] = pair[0];
+    ends[1] = pair[1];
+}
+
+static void pair_name(examiner *e, int a, int b, double amount) {
+    morph_violation *v = e->violation;
+    if (amount <= v->amount[MORPH_LIMIT_SELF]) return;
+    char first[48], second[48];
+    v->amount[MORPH_LIMIT_SELF] = amount;
+    morph_axis_name(e->world->structure, a, first, sizeof first);
+    morph_axis_name(e->world->structure, b, second, sizeof second);
+    snprintf(v->element[MORPH_LIMIT_SELF], sizeof v->element[MORPH_LIMIT_SELF], "%s / %s", first, second);
+}
+
+static void examine_pair(examiner *e, int a, int b) {
+    const morph_structure *s = e->world->structure;
+    int p[2], q[2];
+    axis_ends(s, a, p);
+    axis_ends(s, b, q);
+    if (p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1]) return;
+    /* Posts are taken as thick as links. */
+    const double apart = 2.0 * s->def.radius / s->spacing;
+    double u, v;
+    const double d =
+        morph_segment_segment(&e->x[3 * p[0]], &e->x[3 * p[1]], &e->x[3 * q[0]], &e->x[3 * q[1]], &u, &v);
+    pair_name(e, a, b, apart - d);
+    if (!e->active || d > apart + e->inset->self + e->near->self) return;
+    morph_pair pair = {.joint = {p[0], p[1], q[0], q[1]},
+                       .weight = {1.0 - u, u, v - 1.0, -v},
+                       .distance = apart,
+                       .axis = {a, b}};
+    for (int n = 0; n < e->active->pairs; n++) {
+        const morph_pair *o = &e->active->pair[n];
+        if (o->axis[0] == a && o->axis[1] == b && fabs(o->weight[1] - u) < 0.05 &&
+            fabs(o->weight[3] + v) < 0.05)
+            return;
+    }
+    if (!grow((void **)&e->active->pair, &e->active->pair_capacity, e->active->pairs + 1, sizeof pair)) {
+        e->status = MORPH_ERR_NOMEM;
+        return;
+    }
+    e->active->pair[e->active->pairs++] = pair;
+    e->added++;
+}
+
+typedef struct span {
+    double lo, hi;
+    int axis;
+} span;
+
+static int by_lo(const void *a, const void *b) {
+    const span *p = a, *q = b;
+    return p->lo < q->lo ? -1 : p->lo > q->lo ? 1 : p->axis - q->axis;
+}
+
+/* Sweep along x; pairs whose boxes are apart in y or z are dropped before the exact distance. */
+static void examine_self(examiner *e) {
+    const morph_structure *s = e->world->structure;
+    const int axes = s->links + s->posts;
+    const double reach =
+        2.0 * s->def.radius / s->spacing + (e->active ? e->inset->self + e->near->self : 0.0);
+    span *spans = morph_alloc((size_t)axes, sizeof *spans);
+    if (!spans) {
+        e->status = MORPH_ERR_NOMEM;
+        return;
+    }
+    for (int n = 0; n < axes; n++) {
+        int p[2];
+        axis_ends(s, n, p);
+        spans[n] = (span){fmin(e->x[3 * p[0]], e->x[3 * p[1]]), fmax(e->x[3 * p[0]], e->x[3 * p[1]]), n};
+    }
+    qsort(spans, (size_t)axes, sizeof *spans, by_lo);
+    for (int i = 0; i < axes && e->status == MORPH_OK; i++)
+        for (int j = i + 1; j < axes && spans[j].lo <= spans[i].hi + reach; j++) {
+            int p[2], q[2];
+            axis_ends(s, spans[i].axis, p);
+            axis_ends(s, spans[j].axis, q);
+            bool apart = false;
+            for (int k = 1; k < 3 && !apart; k++) {
+                const double *x = e->x + k;
+                apart = fmin(x[3 * p[0]], x[3 * p[1]]) > fmax(x[3 * q[0]], x[3 * q[1]]) + reach ||
+                        fmin(x[3 * q[0]], x[3 * q[1]]) > fmax(x[3 * p[0]], x[3 * p[1]]) + reach;
+            }
+            const int a = spans[i].axis, b = spans[j].axis;
+            if (!apart) examine_pair(e, a < b ? a : b, a < b ? b : a);
+        }
+    free(spans);
+}
+
+morph_status morph_pose_examine(const morph_world *world, const double *x, const morph_inset *inset,
+                                const morph_nearness *near, morph_active *active, int *added,
+                                morph_violation *violation) {
+    const morph_structure *s = world->structure;
+    static const morph_inset no_inset;
+    morph_violation scratch;
+    examiner e = {.world = world,
+                  .x = x,
+                  .inset = inset ? inset : &no_inset,
+                  .near = near,
+                  .active = active,
+                  .violation = violation ? violation : &scratch};
+    memset(e.violation, 0, sizeof *e.violation);
+    for (int k = 0; k < MORPH_LIMITS; k++)
+        e.violation->amount[k] = -INFINITY;
+    e.metres = morph_alloc(3 * (size_t)s->joints, sizeof(double));
+    if (!e.metres) return MORPH_ERR_NOMEM;
+    for (int i = 0; i < 3 * s->joints; i++) {
+        e.metres[i] = x[i] * s->spacing;
+        if (!isfinite(x[i])) e.status = MORPH_ERR_NONFINITE;
+    }
+    if (e.status == MORPH_OK) {
+        examine_members(&e);
+        examine_angles(&e);
+        examine_clearance(&e);
+        examine_self(&e);
+    }
+    free(e.metres);
+    if (added) *added = e.added;
+    return e.status;
+}
+
+int morph_active_blocks(morph_active *a, const morph_world *world, const int *unknown,
+                        const morph_inset *inset, morph_block out[MORPH_POSE_BLOCKS]) {
+    const morph_structure *s = world->structure;
+    const int rows = morph_active_rows(a, s);
+    if (rows > a->bound_capacity) {
+        double *lower = realloc(a->lower, (size_t)rows * sizeof *lower);
+        if (lower) a->lower = lower;
+        double *upper = realloc(a->upper, (size_t)rows * sizeof *upper);
+        if (upper) a->upper = upper;
+        if (!lower || !upper) return -1;
+        a->bound_capacity = rows;
+    }
+    a->post_rows = (morph_post_rows){s};
+    a->length_rows = (morph_length_rows){s, a->links, a->link, inset->length};
+    a->angle_rows = (morph_angle_rows){s, a->tuples, a->tuple, inset->angle};
+    a->clearance_rows = (morph_clearance_rows){s, world->sdf, a->points, a->point, inset->clearance};
+    a->separation_rows = (morph_separation_rows){s, a->pairs, a->pair, inset->self};
+    double *lo = a->lower, *hi = a->upper;
+    int n = 0;
+    out[n++] = morph_block_posts(&a->post_rows, unknown, lo, hi);
+    lo += s->posts, hi += s->posts;
+    if (a->links) out[n++] = morph_block_lengths(&a->length_rows, unknown, lo, hi);
+    lo += a->links, hi += a->links;
+    if (a->tuples) out[n++] = morph_block_angles(&a->angle_rows, unknown, lo, hi);
+    lo += a->tuples, hi += a->tuples;
+    if (a->points) out[n++] = morph_block_clearance(&a->clearance_rows, unknown, lo, hi);
+    lo += a->points, hi += a->points;
+    if (a->pairs) out[n++] = morph_block_separation(&a->separation_rows, unknown, lo, hi);
+    return n;
+}
+
+void morph_pose_bounds(const morph_world *world, double margin, double *lower) {
+    const morph_structure *s = world->structure;
+    for (int i = 0; i < 3 * s->joints; i++)
+        lower[i] = i % 3 == 2 && !isnan(world->base) ? (world->base + s->def.radius) / s->spacing + margin
+                                                     : -INFINITY;
+}
+
+double morph_violation_worst(const morph_violation *v, const double tolerance[MORPH_LIMITS],
+                             morph_limit *which) {
+    double worst = -INFINITY;
+    for (int k = 0; k < MORPH_LIMITS; k++)
+        if (v->amount[k] / tolerance[k] > worst) {
+            worst = v->amount[k] / tolerance[k];
+            if (which) *which = (morph_limit)k;
+        }
+    return worst;
+}
