@@ -62,6 +62,15 @@ void morph_blas_threads(int n) {
     if (set.object) set.call(n);
 }
 
+const char *morph_blas_name(void) {
+    union {
+        void *object;
+        char *(*call)(void);
+    } name = {dlsym(RTLD_DEFAULT, "openblas_get_corename")};
+    const char *text = name.object ? name.call() : NULL;
+    return text ? text : "";
+}
+
 void *morph_alloc(size_t n, size_t m) {
     if (m != 0 && n > SIZE_MAX / m) return NULL;
     const size_t bytes = n * m;

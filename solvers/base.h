@@ -44,6 +44,10 @@ double morph_seconds(void);
 /* Pins OpenBLAS (where it is the BLAS) to n threads, so that sums repeat bit for bit. */
 void morph_blas_threads(int n);
 
+/* Name of OpenBLAS's kernel on this machine (results are the same bits per kernel only); "" with another
+ * BLAS. */
+const char *morph_blas_name(void);
+
 /* calloc(n * m) that refuses overflow; n or m 0 gives a valid pointer to free. */
 void *morph_alloc(size_t n, size_t m);
 

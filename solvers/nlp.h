@@ -81,6 +81,11 @@ typedef struct morph_nlp_options {
     bool warm;          /* start from result's x and multipliers of a previous solve with the same shape */
     double mu_init;     /* <= 0: the library's */
     bool adaptive_mu;
+    /* Run the solver in a child process: then running out of memory inside it (which may end a process by a
+     * signal or by an exit with code 0) is MORPH_ERR_BACKEND and not the end of the caller, and stop and
+     * max_seconds hold even within one long factorisation. Blocks then run in the child, on copies: what they
+     * write to their data is lost; stop, progress and log still run in the caller. */
+    bool isolated;
     const morph_control *control; /* stop is asked once per iteration */
 } morph_nlp_options;
 morph_nlp_options morph_nlp_defaults(void);
@@ -95,17 +100,23 @@ typedef struct morph_nlp_result {
     double violation; /* worst over rows and bounds, recomputed from x */
     int worst_row;    /* global row of it; -1: a bound or none */
     int unknowns, rows;
-    double
-        *x; /* the best point: feasible with the least objective if any was seen, else the least violating */
+    /* The best point: feasible with the least objective if any was seen, else the least violating. Ipopt's
+     * last point goes before a kept one that is lower by no more than its violation within the tolerance can
+     * buy. */
+    double *x;
     double *row_multiplier, *lower_multiplier,
         *upper_multiplier; /* rows, unknowns, unknowns; of the last iterate */
     double seconds, linear_seconds, callback_seconds;
 } morph_nlp_result;
 void morph_nlp_result_free(morph_nlp_result *result);
 
-/* Solves from x0 (unknowns), or warm from *result. Never prints, never reads an option file, never exits. One
- * solve at a time per process (a mutex: MUMPS is not re-entrant). A status other than MORPH_OK means no
- * result (all memory released); an infeasible problem is MORPH_OK with outcome MORPH_INFEASIBLE. */
+/* Solves from x0 (unknowns; NULL if warm; may be result->x), or warm from *result, which must be zeroed or an
+ * earlier result: that is released, also on failure. options NULL: the defaults. MORPH_ERR_INPUT: an option
+ * or a start that is not finite, or a warm start of another shape; MORPH_ERR_NONFINITE: derivatives that are
+ * not finite and nothing feasible seen. Each thread needs its own problem. Never prints, never reads an
+ * option file, never exits. One solve at a time per process (a mutex: MUMPS is not re-entrant). A status
+ * other than MORPH_OK means no result (all memory released); an infeasible problem is MORPH_OK with outcome
+ * MORPH_INFEASIBLE. */
 morph_status morph_nlp_solve(morph_nlp *nlp, const double *x0, const morph_nlp_options *options,
                              morph_nlp_result *result);
 

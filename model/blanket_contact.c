@@ -1,0 +1,234 @@
+/* Contact of the blanket with the target and the base plane. */
+#include "model/blanket_internal.h"
+
+#include <string.h>
+
+/* Contacts aim this much outside, as the other limits do (blanket_project.c). */
+#define CONTACT_MARGIN 1e-3 /* spacings */
+/* Places closer than this beyond a step's motion are listed: corrections within a step stay below it. */
+#define NEAR 0.05 /* spacings */
+/* The smooth distance has a slope near 1, less where edges are rounded; a flatter gradient than this is no
+ * direction to trust with a full correction. */
+#define LEAST_SLOPE 0.3
+/* Slope that the smooth distance does not exceed: 1 but for the spline's overshoot beside edges. */
+#define MOST_SLOPE 1.3
+/* Search for the deepest place: strides in barycentric weight. */
+#define LONGEST_STRIDE 0.25
+#define SHORTEST_STRIDE 0.01
+
+static morph_touch *add_touch(morph_blanket_state *b, const int *joint, int corners, const double *weight,
+                              double radius) {
+    morph_touch *t = &b->touch[b->touches++];
+    memset(t, 0, sizeof *t);
+    t->corners = corners;
+    t->radius = radius;
+    for (int k = 0; k < corners; k++) {
+        t->joint[k] = joint[k];
+        t->weight[k] = weight[k];
+    }
+    return t;
+}
+
+/* Links: three fixed places. Skin triangles: four fixed places and one that seeks the deepest; as the links
+ * of the skin's layer are edges of its triangles, only the other links have a seeking place of their own. */
+morph_status morph_blanket_touches_create(morph_blanket_state *b) {
+    static const double along[3][2] = {{0.75, 0.25}, {0.5, 0.5}, {0.25, 0.75}};
+    static const double within[4][3] = {{4.0 / 6.0, 1.0 / 6.0, 1.0 / 6.0},
+                                        {1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0},
+                                        {1.0 / 6.0, 1.0 / 6.0, 4.0 / 6.0},
+                                        {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}};
+    const morph_structure *s = b->structure;
+    const double whole = 1.0;
+    const size_t most = (size_t)s->joints + 4 * (size_t)s->links + 5 * (size_t)s->skin_triangles;
+    b->touch = morph_alloc(most, sizeof *b->touch);
+    b->contact = morph_alloc(most + (size_t)s->joints, sizeof *b->contact);
+    if (!b->touch || !b->contact) return MORPH_ERR_NOMEM;
+    if (!b->sdf) return MORPH_OK;
+    for (int j = 0; j < s->joints; j++)
+        add_touch(b, &j, 1, &whole, s->def.radius);
+    for (int l = 0; l < s->links; l++) {
+        for (int k = 0; k < 3; k++)
+            add_touch(b, s->link[l], 2, along[k], s->link_radius[l]);
+        if (s->link_kind[l] != MORPH_LINK_BOTTOM)
+            add_touch(b, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
+    }
+    for (int t = 0; t < s->skin_triangles; t++) {
+        for (int k = 0; k < 4; k++)
+            add_touch(b, s->skin[t], 3, within[k], s->def.radius);
+        add_touch(b, s->skin[t], 3, within[3], s->def.radius)->stride = LONGEST_STRIDE;
+    }
+    return MORPH_OK;
+}
+
+static void place_of(const double *x, const int *joint, int corners, const double *weight, double q[3]) {
+    for (int k = 0; k < 3; k++) {
+        q[k] = 0.0;
+        for (int j = 0; j < corners; j++)
+            q[k] += weight[j] * x[3 * joint[j] + k];
+    }
+}
+
+static double extent_of(const morph_touch *t, const double *x) {
+    double extent = 0.0;
+    for (int j = 0; j < t->corners; j++)
+        for (int k = 0; k < j; k++)
+            extent = fmax(extent, morph_dist(&x[3 * t->joint[j]], &x[3 * t->joint[k]]));
+    return extent;
+}
+
+/* One round of a compass search in the weights: the place moves a stride towards the corner that brings it
+ * deepest, or the stride shrinks. Kept from step to step, it follows the deepest place of the element. */
+static double seek(const morph_blanket_state *b, morph_touch *t, const double *x, double value) {
+    double best[3], lowest = value;
+    for (int j = 0; j < t->corners; j++) {
+        double weight[3], q[3];
+        for (int k = 0; k < t->corners; k++)
+            weight[k] = (1.0 - t->stride) * t->weight[k] + (k == j ? t->stride : 0.0);
+        place_of(x, t->joint, t->corners, weight, q);
+        const double here = morph_sdf_eval(b->sdf, q, NULL, NULL);
+        if (here < lowest) {
+            lowest = here;
+            memcpy(best, weight, sizeof best);
+        }
+    }
+    if (lowest < value) {
+        memcpy(t->weight, best, sizeof best);
+        t->stride = fmin(1.5 * t->stride, LONGEST_STRIDE);
+    } else
+        t->stride = fmax(0.5 * t->stride, SHORTEST_STRIDE);
+    return lowest;
+}
+
+/* Half space of the smooth distance about the contact's place: phi + g.(q - q0) >= radius, divided by |g|. */
+static bool set_plane(const morph_blanket_state *b, morph_contact *c, const double *x, double radius) {
+    double q[3], g[3];
+    place_of(x, c->joint, c->corners, c->weight, q);
+    const double phi = morph_sdf_eval(b->sdf, q, g, NULL);
+    const double slope = morph_norm(g);
+    if (!(slope > 1e-6)) return false; /* a ridge inside the target: neighbours will lead out */
+    for (int k = 0; k < 3; k++)
+        c->normal[k] = g[k] / slope;
+    const double aim = radius + CONTACT_MARGIN * b->structure->spacing;
+    c->level = morph_dot(c->normal, q) - (phi - aim) / fmax(slope, LEAST_SLOPE);
+    c->radius = radius;
+    return true;
+}
+
+static morph_contact *add_contact(morph_blanket_state *b, const int *joint, int corners,
+                                  const double *weight) {
+    morph_contact *c = &b->contact[b->contacts];
+    memset(c, 0, sizeof *c);
+    c->corners = corners;
+    double sum = 0.0;
+    for (int k = 0; k < corners; k++) {
+        c->joint[k] = joint[k];
+        c->weight[k] = weight[k];
+        sum += weight[k] * weight[k];
+    }
+    c->inverse = 1.0 / sum;
+    place_of(b->before, c->joint, c->corners, c->weight, c->before);
+    return c;
+}
+
+static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double move) {
+    if (b->path + move < t->wake) return;
+    double q[3];
+    place_of(x, t->joint, t->corners, t->weight, q);
+    double gap = morph_sdf_eval(b->sdf, q, NULL, NULL) - t->radius;
+    const double near = NEAR * b->structure->spacing + move;
+    const double reach = t->stride > 0.0 ? extent_of(t, x) : 0.0;
+    const double spare = gap / MOST_SLOPE - reach - near;
+    if (spare > 0.0) {
+        t->wake = b->path - move + spare;
+        return;
+    }
+    if (t->stride > 0.0) gap = seek(b, t, x, gap + t->radius) - t->radius;
+    if (gap > near) return;
+    morph_contact *c = add_contact(b, t->joint, t->corners, t->weight);
+    if (set_plane(b, c, x, t->radius)) b->contacts++;
+}
+
+/* Links and skin lie above the plane wherever their joints do. */
+static void find_base(morph_blanket_state *b, const double *x, double move) {
+    static const double whole = 1.0;
+    const double radius = b->structure->def.radius, near = NEAR * b->structure->spacing + move;
+    for (int j = 0; j < b->joints; j++) {
+        if (x[3 * j + 2] > b->def.base + radius + near) continue;
+        morph_contact *c = add_contact(b, &j, 1, &whole);
+        c->normal[2] = 1.0;
+        c->level = b->def.base + radius + CONTACT_MARGIN * b->structure->spacing;
+        c->radius = -1.0;
+        b->contacts++;
+    }
+}
+
+void morph_blanket_wake(morph_blanket_state *b) {
+    for (int t = 0; t < b->touches; t++)
+        b->touch[t].wake = 0.0;
+}
+
+void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
+    double fastest = 0.0;
+    for (int j = 0; j < b->joints; j++) {
+        double move[3];
+        morph_sub(&x[3 * j], &b->before[3 * j], move);
+        fastest = fmax(fastest, morph_dot(move, move));
+    }
+    const double move = sqrt(fastest);
+    b->contacts = 0;
+    for (int t = 0; t < b->touches; t++)
+        find_target(b, &b->touch[t], x, move);
+    if (!isnan(b->def.base)) find_base(b, x, move);
+}
+
+void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
+    for (int k = 0; k < b->contacts; k++) {
+        morph_contact *c = &b->contact[k];
+        if (c->radius >= 0.0 && c->push > 0.0) set_plane(b, c, x, c->radius);
+    }
+}
+
+/* The place's centre q moves by weight_j times what joint j moves; joints move by weight_j times push, so q
+ * by push / inverse. Normal: unilateral. Friction: undo the tangential motion since the step's start, by at
+ * most friction times the normal push (Coulomb; sticking inside the cone, sliding on it). */
+void morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
+    double q[3], change[3], slide[3];
+    place_of(x, c->joint, c->corners, c->weight, q);
+    const double gap = morph_dot(c->normal, q) - c->level;
+    const double old = c->push;
+    c->push = fmax(0.0, old - gap * c->inverse);
+    if (c->push == 0.0 && old == 0.0) return;
+    for (int k = 0; k < 3; k++)
+        change[k] = (c->push - old) * c->normal[k];
+    if (friction > 0.0) {
+        morph_sub(q, c->before, slide);
+        const double along = morph_dot(slide, c->normal);
+        for (int k = 0; k < 3; k++)
+            slide[k] = c->drag[k] - (slide[k] - along * c->normal[k]) * c->inverse;
+        const double size = morph_norm(slide), most = friction * c->push;
+        const double keep = size > most ? most / size : 1.0;
+        for (int k = 0; k < 3; k++) {
+            change[k] += keep * slide[k] - c->drag[k];
+            c->drag[k] = keep * slide[k];
+        }
+    }
+    for (int j = 0; j < c->corners; j++)
+        for (int k = 0; k < 3; k++)
+            x[3 * c->joint[j] + k] += c->weight[j] * change[k];
+}
+
+double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
+    double depth = 0.0, move = 0.0;
+    for (int j = 0; j < b->joints; j++) {
+        if (!isnan(b->def.base)) depth = fmax(depth, b->def.base + b->structure->def.radius - x[3 * j + 2]);
+        move = fmax(move, morph_dist(&x[3 * j], &b->before[3 * j]));
+    }
+    for (int k = 0; k < b->touches; k++) {
+        const morph_touch *t = &b->touch[k];
+        if (b->path + move < t->wake) continue;
+        double q[3];
+        place_of(x, t->joint, t->corners, t->weight, q);
+        depth = fmax(depth, t->radius - morph_sdf_eval(b->sdf, q, NULL, NULL));
+    }
+    return depth;
+}

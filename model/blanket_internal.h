@@ -1,0 +1,111 @@
+/* Inside the blanket: its mutable state and the pieces that move it. For model/blanket*.c and their tests.
+ *
+ * Every joint has the same mass, so the mass-weighted corrections of the projections weigh all joints alike:
+ * a constraint c(x) is corrected by dx_j = -c grad_j / sum_k |grad_k|^2, which keeps linear momentum wherever
+ * the gradients of one constraint add up to zero. */
+#ifndef MORPH_BLANKET_INTERNAL_H
+#define MORPH_BLANKET_INTERNAL_H
+
+#include "model/blanket.h"
+
+/* A place on a joint (1 corner), a link (2) or a skin triangle (3) that may touch the target. */
+typedef struct morph_touch {
+    int joint[3], corners;
+    double weight[3]; /* barycentric */
+    double radius;    /* m */
+    double wake;      /* path length (state.path) before which it cannot touch */
+    double stride;    /* of the search for the deepest place on the element; 0: the place is fixed */
+} morph_touch;
+
+/* One contact of one step: the half space normal.q >= level for the place's centre q. */
+typedef struct morph_contact {
+    int joint[3], corners;
+    double weight[3];
+    double normal[3], level;
+    double before[3]; /* q at the step's start: friction acts on the motion since */
+    double inverse;   /* 1 / sum weight^2 */
+    double radius;    /* of the place; -1: a contact with the base plane */
+    double push;      /* accumulated along the normal, >= 0 (m per unit weight) */
+    double drag[3];   /* accumulated friction, at most friction * push */
+} morph_contact;
+
+/* Angle between u and v as floor <= cos <= ceiling; joint[k] enters u with su[k] and v with sv[k]. */
+typedef struct morph_angle {
+    int joint[4], joints;
+    int far[2]; /* where the arms end */
+    double su[4], sv[4];
+    double floor, ceiling;  /* aimed at, a little inside */
+    double lowest, highest; /* the structure's limits */
+    double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
+} morph_angle;
+
+/* Sweeps of a step; the limits' margins absorb what is left. */
+#define MORPH_BLANKET_SWEEPS 12
+
+/* How far the state is from its limits; violations are >= 0. */
+typedef struct morph_violation {
+    double length;    /* m */
+    double post;      /* relative */
+    double clearance; /* m, at the places known */
+    double angle;     /* in cosine */
+} morph_violation;
+
+typedef struct morph_blanket_state {
+    const morph_structure *structure;
+    const morph_sdf *sdf;        /* NULL: no target */
+    const morph_distance *exact; /* may be NULL */
+    morph_blanket_def def;
+    int joints, links, posts, angles, touches, contacts;
+    double step;             /* s */
+    double path;             /* sum over the steps of the fastest joint's motion, m */
+    double *x, *v;           /* 3*joints */
+    double *a;               /* acceleration at x by springs and gravity */
+    double *before;          /* x at the step's start */
+    double *keep_x, *keep_v; /* for a second try with a smaller step */
+    double (*limit)[2];      /* links: what the projection aims at, a little inside the structure's limits */
+    double (*push)[2];       /* links: accumulated corrections of this step at the two limits */
+    morph_angle *angle;
+    morph_touch *touch;
+    morph_contact *contact; /* capacity: touches + joints */
+} morph_blanket_state;
+
+/* sdf may be NULL (no target). Validates def; x0 is copied, velocities are 0. */
+morph_status morph_blanket_state_create(const morph_structure *s, const morph_sdf *sdf,
+                                        const morph_blanket_def *def, const double *x0,
+                                        morph_blanket_state **out);
+void morph_blanket_state_destroy(morph_blanket_state *b); /* NULL allowed */
+bool morph_blanket_finite(const morph_blanket_state *b);  /* x and v */
+
+/* blanket_force.c. None of these allocates. */
+double morph_blanket_stable_step(const morph_structure *s); /* largest step to use, s */
+void morph_blanket_accelerations(morph_blanket_state *b);   /* a from x */
+double morph_blanket_energy(const morph_blanket_state *b);  /* kinetic + springs + gravity, J */
+void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, double *spring); /* J */
+/* One step of b->step. False when the state is not finite any more. */
+bool morph_blanket_step(morph_blanket_state *b);
+
+/* blanket_project.c */
+morph_status morph_blanket_limits_create(morph_blanket_state *b);
+void morph_blanket_project_start(morph_blanket_state *b); /* forgets the accumulated corrections */
+/* One pass over angles, lengths, contacts and posts of x; backward turns the order round. */
+void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
+/* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
+void morph_blanket_project_posts_along(morph_blanket_state *b);
+/* blanket_polish.c. Violation: at x, against the structure's own limits. Polish: sweeps until x holds them
+ * or stops improving; velocities are not touched. */
+morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x);
+
+void morph_blanket_polish(morph_blanket_state *b, double *x);
+
+/* blanket_contact.c */
+morph_status morph_blanket_touches_create(morph_blanket_state *b);
+void morph_blanket_wake(morph_blanket_state *b); /* after x was set from outside: forgets what is far */
+/* Lists the contacts near x; `before` in the state is where friction counts from. */
+void morph_blanket_find_contacts(morph_blanket_state *b, const double *x);
+/* Planes of the listed contacts anew at x, corrections kept. */
+void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x);
+/* Deepest known violation of a place's radius or the base plane at x, m, >= 0. */
+double morph_blanket_depth(const morph_blanket_state *b, const double *x);
+void morph_blanket_project_contact(morph_contact *c, double *x, double friction);
+
+#endif

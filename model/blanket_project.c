@@ -1,0 +1,169 @@
+/* Projections of the blanket: rigid posts, length limits, angle limits. */
+#include "model/blanket_internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The sweeps converge towards the limits from outside, so they aim a little inside: what is left after them
+ * then still holds the true limits. Small against what a limit means (a link of 1 spacing has a range of 0.6,
+ * an angle one of 80 degrees). */
+#define LENGTH_MARGIN 1e-3 /* spacings */
+#define ANGLE_MARGIN 0.01  /* radians */
+
+/* Joints of a tuple with their parts in u and v. */
+static void set_angle(morph_angle *a, const int uj[2], const int vj[2], const double limit[2]) {
+    a->joints = 0;
+    for (int k = 0; k < 4; k++) {
+        const int joint = k < 2 ? uj[k] : vj[k - 2];
+        int at = 0;
+        while (at < a->joints && a->joint[at] != joint)
+            at++;
+        if (at == a->joints) {
+            a->joint[a->joints++] = joint;
+            a->su[at] = a->sv[at] = 0.0;
+        }
+        *(k < 2 ? &a->su[at] : &a->sv[at]) += (k & 1) ? 1.0 : -1.0;
+    }
+    /* The joint in both arms is the corner, the others their far ends. */
+    int ends = 0;
+    for (int k = 0; k < a->joints; k++)
+        if ((a->su[k] == 0.0) != (a->sv[k] == 0.0) && ends < 2) a->far[ends++] = a->joint[k];
+    const double margin = fmin(ANGLE_MARGIN, 0.25 * (limit[1] - limit[0]));
+    a->highest = cos(limit[0]);
+    a->lowest = cos(limit[1]);
+    a->ceiling = cos(limit[0] + margin);
+    a->floor = cos(limit[1] - margin);
+}
+
+morph_status morph_blanket_limits_create(morph_blanket_state *b) {
+    const morph_structure *s = b->structure;
+    b->limit = morph_alloc((size_t)b->links, sizeof *b->limit);
+    b->push = morph_alloc((size_t)b->links, sizeof *b->push);
+    b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
+    if (!b->limit || !b->push || !b->angle) return MORPH_ERR_NOMEM;
+    for (int l = 0; l < b->links; l++) {
+        const double lo = s->length_limit[l][0], hi = s->length_limit[l][1];
+        const double margin = fmin(LENGTH_MARGIN * s->spacing, 0.25 * (hi - lo));
+        b->limit[l][0] = lo + margin;
+        b->limit[l][1] = hi - margin;
+    }
+    int n = 0, uj[2], vj[2];
+    for (int t = 0; t < s->link_posts; t++) {
+        morph_link_post_joints(s, t, uj, vj);
+        set_angle(&b->angle[n++], uj, vj, s->link_post_limit[t]);
+    }
+    for (int t = 0; t < s->link_links; t++) {
+        morph_link_link_joints(s, t, uj, vj);
+        set_angle(&b->angle[n++], uj, vj, s->link_link_limit[t]);
+    }
+    return MORPH_OK;
+}
+
+void morph_blanket_project_start(morph_blanket_state *b) {
+    memset(b->push, 0, (size_t)b->links * sizeof *b->push);
+    for (int t = 0; t < b->angles; t++)
+        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+}
+
+/* With e the post before the step and d after the drift, the ends move by -+ q e / 2 so that |d + q e| = h:
+ * q^2 e.e + 2 q d.e + d.d - h^2 = 0. Correcting along the old direction (SHAKE) keeps the leapfrog symmetric
+ * in time, so that rigid posts alone do not consume energy. */
+void morph_blanket_project_posts_along(morph_blanket_state *b) {
+    const morph_structure *s = b->structure;
+    for (int p = 0; p < b->posts; p++) {
+        double *xb = &b->x[3 * s->post[p][0]], *xt = &b->x[3 * s->post[p][1]], d[3], e[3];
+        morph_sub(xt, xb, d);
+        morph_sub(&b->before[3 * s->post[p][1]], &b->before[3 * s->post[p][0]], e);
+        const double ee = morph_dot(e, e), de = morph_dot(d, e);
+        const double c = morph_dot(d, d) - s->post_length[p] * s->post_length[p];
+        const double root = de * de - ee * c;
+        if (!(de > 0.0 && root >= 0.0)) continue; /* turned too far in one step: left to the sweeps */
+        const double q = -c / (de + sqrt(root));  /* the root near 0, without cancellation */
+        for (int k = 0; k < 3; k++) {
+            xb[k] -= 0.5 * q * e[k];
+            xt[k] += 0.5 * q * e[k];
+        }
+    }
+}
+
+/* Posts share no joint, so this one is exact. */
+static void project_posts(const morph_blanket_state *b, double *x) {
+    const morph_structure *s = b->structure;
+    for (int p = 0; p < b->posts; p++) {
+        double *xb = &x[3 * s->post[p][0]], *xt = &x[3 * s->post[p][1]], d[3];
+        morph_sub(xt, xb, d);
+        const double length = morph_norm(d);
+        if (!(length > 0.0)) continue;
+        const double q = 0.5 * (s->post_length[p] / length - 1.0);
+        for (int k = 0; k < 3; k++) {
+            xb[k] -= q * d[k];
+            xt[k] += q * d[k];
+        }
+    }
+}
+
+/* An inequality's correction: grows as far as needed, shrinks again when a neighbour has relieved it, never
+ * below zero (projected Gauss-Seidel). `gap` < 0 is a violation; returns the change. */
+static double unilateral(double *push, double gap) {
+    const double old = *push;
+    *push = fmax(0.0, old - gap);
+    return *push - old;
+}
+
+static void project_length(morph_blanket_state *b, int l, double *x) {
+    const int *ends = b->structure->link[l];
+    double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], d[3];
+    morph_sub(xj, xi, d);
+    const double length = morph_norm(d);
+    if (!(length > 0.0)) return;
+    double grow = unilateral(&b->push[l][0], length - b->limit[l][0]);
+    if (b->push[l][0] == 0.0) grow -= unilateral(&b->push[l][1], b->limit[l][1] - length);
+    if (grow == 0.0) return;
+    const double q = 0.5 * grow / length;
+    for (int k = 0; k < 3; k++) {
+        xi[k] -= q * d[k];
+        xj[k] += q * d[k];
+    }
+}
+
+/* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
+ * su dc/du + sv dc/dv. Correction along it over the sum of squares. */
+static void project_angle(morph_angle *a, double *x) {
+    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0}, grad[4][3];
+    for (int j = 0; j < a->joints; j++)
+        for (int k = 0; k < 3; k++) {
+            u[k] += a->su[j] * x[3 * a->joint[j] + k];
+            v[k] += a->sv[j] * x[3 * a->joint[j] + k];
+        }
+    const double uu = morph_dot(u, u), vv = morph_dot(v, v);
+    const double scale = sqrt(uu * vv);
+    if (!(scale > 0.0)) return;
+    const double c = morph_dot(u, v) / scale;
+    if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return;
+    double square = 0.0;
+    for (int j = 0; j < a->joints; j++) {
+        for (int k = 0; k < 3; k++)
+            grad[j][k] =
+                a->su[j] * (v[k] / scale - c * u[k] / uu) + a->sv[j] * (u[k] / scale - c * v[k] / vv);
+        square += morph_dot(grad[j], grad[j]);
+    }
+    /* Parallel arms have no gradient; the limits keep far from there. */
+    if (!(square * scale > 1e-12)) return;
+    double change = unilateral(&a->push[0], (c - a->floor) / square);
+    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], (a->ceiling - c) / square);
+    for (int j = 0; j < a->joints; j++)
+        for (int k = 0; k < 3; k++)
+            x[3 * a->joint[j] + k] += change * grad[j][k];
+}
+
+/* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
+ * angles yield where all cannot hold at once. */
+void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction) {
+    for (int t = 0; t < b->angles; t++)
+        project_angle(&b->angle[backward ? b->angles - 1 - t : t], x);
+    for (int l = 0; l < b->links; l++)
+        project_length(b, backward ? b->links - 1 - l : l, x);
+    for (int c = 0; c < b->contacts; c++)
+        morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
+    project_posts(b, x);
+}

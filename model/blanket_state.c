@@ -1,0 +1,69 @@
+/* The blanket's state: made once, then only moved. */
+#include "model/blanket_internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static bool def_ok(const morph_blanket_def *d) {
+    const double least_zero[] = {d->gravity, d->drag, d->friction, d->time, d->step};
+    for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
+        if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
+    return isfinite(d->frame) && d->frame > 0.0 && (isnan(d->base) || isfinite(d->base));
+}
+
+static morph_status allocate(morph_blanket_state *b) {
+    const size_t n = 3 * (size_t)b->joints;
+    double **const arrays[] = {&b->x, &b->v, &b->a, &b->before, &b->keep_x, &b->keep_v};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
+        if (!(*arrays[k] = morph_alloc(n, sizeof(double)))) return MORPH_ERR_NOMEM;
+    const morph_status status = morph_blanket_limits_create(b);
+    return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
+}
+
+morph_status morph_blanket_state_create(const morph_structure *s, const morph_sdf *sdf,
+                                        const morph_blanket_def *def, const double *x0,
+                                        morph_blanket_state **out) {
+    *out = NULL;
+    if (!def_ok(def)) return MORPH_ERR_INPUT;
+    for (int k = 0; k < 3 * s->joints; k++)
+        if (!isfinite(x0[k])) return MORPH_ERR_NONFINITE;
+    morph_blanket_state *b = morph_alloc(1, sizeof *b);
+    if (!b) return MORPH_ERR_NOMEM;
+    b->structure = s;
+    b->sdf = sdf;
+    b->def = *def;
+    b->joints = s->joints;
+    b->links = s->links;
+    b->posts = s->posts;
+    b->angles = s->link_posts + s->link_links;
+    const morph_status status = allocate(b);
+    if (status != MORPH_OK) {
+        morph_blanket_state_destroy(b);
+        return status;
+    }
+    memcpy(b->x, x0, 3 * (size_t)b->joints * sizeof(double));
+    memcpy(b->before, x0, 3 * (size_t)b->joints * sizeof(double));
+    b->step = def->step > 0.0 ? def->step : morph_blanket_stable_step(s);
+    morph_blanket_accelerations(b);
+    *out = b;
+    return MORPH_OK;
+}
+
+void morph_blanket_state_destroy(morph_blanket_state *b) {
+    if (!b) return;
+    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
+        free(arrays[k]);
+    free(b->limit);
+    free(b->push);
+    free(b->angle);
+    free(b->touch);
+    free(b->contact);
+    free(b);
+}
+
+bool morph_blanket_finite(const morph_blanket_state *b) {
+    for (int k = 0; k < 3 * b->joints; k++)
+        if (!isfinite(b->x[k]) || !isfinite(b->v[k])) return false;
+    return true;
+}

@@ -1,0 +1,191 @@
+/* The public calls: each reads, runs its stages and writes. */
+#include "model/kinematics.h"
+#include "planner/check.h"
+#include "planner/folder.h"
+#include "planner/morphplan.h"
+#include "planner/picture.h"
+#include "planner/plan.h"
+#include "planner/text.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+morph_job morph_job_defaults(void) {
+    return (morph_job){.method = "ipopt"};
+}
+
+const char *morph_version(void) {
+    return MORPH_VERSION;
+}
+
+static void say(const morph_job *job, const char *line) {
+    if (job->message && line[0]) job->message(job->user, line);
+}
+
+typedef struct fault_context {
+    const morph_job *job;
+} fault_context;
+
+static void pass_fault(void *user, const char *line) {
+    say(((const fault_context *)user)->job, line);
+}
+
+static int exit_of(morph_status status) {
+    switch (status) {
+    case MORPH_OK:
+        return MORPH_EXIT_DONE;
+    case MORPH_ERR_INPUT:
+        return MORPH_EXIT_INPUT;
+    case MORPH_ERR_STOPPED:
+        return MORPH_EXIT_STOPPED;
+    case MORPH_ERR_NOMEM:
+    case MORPH_ERR_NONFINITE:
+    case MORPH_ERR_BACKEND:
+    case MORPH_ERR_IO:
+    case MORPH_ERR_INTERNAL:
+        break;
+    }
+    return MORPH_EXIT_INTERNAL;
+}
+
+static int fail(const morph_job *job, const char *what, morph_status status) {
+    char line[256];
+    snprintf(line, sizeof line, "morphplan: %s: %s", what, morph_status_text(status));
+    say(job, line);
+    return exit_of(status);
+}
+
+static int read_scene(const char *path, const morph_job *job, morph_scene **scene) {
+    fault_context context = {job};
+    const morph_status status = morph_scene_read(path, pass_fault, pass_fault, &context, scene);
+    if (status == MORPH_OK) return MORPH_EXIT_DONE;
+    return status == MORPH_ERR_INPUT ? MORPH_EXIT_INPUT : fail(job, path, status);
+}
+
+/* "dir/cube.yaml" -> "dir/cube.plan"; a dot in a folder's name is no ending. */
+static char *default_folder(const char *scene) {
+    const char *slash = strrchr(scene, '/'), *name = slash ? slash + 1 : scene, *dot = strrchr(name, '.');
+    const size_t stem = dot && dot != name ? (size_t)(dot - scene) : strlen(scene);
+    char *folder = malloc(stem + sizeof ".plan");
+    if (folder) {
+        memcpy(folder, scene, stem);
+        memcpy(folder + stem, ".plan", sizeof ".plan");
+    }
+    return folder;
+}
+
+static int plan_into(const morph_scene *scene, const char *folder, const morph_job *job, char **text,
+                     char **json) {
+    const morph_control control = {job->stop, job->progress, job->log, job->user};
+    const morph_plan_options options = {
+        job->method && strcmp(job->method, "blanket") == 0 ? MORPH_METHOD_BLANKET : MORPH_METHOD_IPOPT,
+        &control};
+    char message[512] = "";
+    morph_status status = morph_folder_probe(folder, job->overwrite, message, sizeof message);
+    if (status != MORPH_OK) {
+        say(job, message);
+        return exit_of(status);
+    }
+    morph_plan *plan = NULL;
+    status = morph_plan_run(scene, &options, &plan);
+    if (status != MORPH_OK) return fail(job, scene->file, status);
+    int code = MORPH_EXIT_DONE;
+    status = morph_folder_write(folder, job->overwrite, scene, &plan->record, &plan->summary, message,
+                                sizeof message);
+    if (status != MORPH_OK) {
+        say(job, message);
+        code = exit_of(status);
+    } else {
+        if (text) *text = morph_plan_text(&plan->summary, folder);
+        if (json && morph_summary_to_json(&plan->summary, json) != MORPH_OK) *json = NULL;
+        if (strcmp(plan->summary.outcome, "stopped") == 0)
+            code = MORPH_EXIT_STOPPED;
+        else if (!plan->summary.feasible)
+            code = MORPH_EXIT_INFEASIBLE;
+        if (code == MORPH_EXIT_INFEASIBLE) {
+            char line[600];
+            snprintf(line, sizeof line, "morphplan: infeasible: %s", plan->summary.reason);
+            say(job, line);
+        }
+    }
+    morph_plan_destroy(plan);
+    return code;
+}
+
+int morph_plan_scene(const char *path, const morph_job *job, char **text, char **json) {
+    if (text) *text = NULL;
+    if (json) *json = NULL;
+    morph_scene *scene = NULL;
+    int code = read_scene(path, job, &scene);
+    if (code != MORPH_EXIT_DONE) return code;
+    char *own = job->folder ? NULL : default_folder(path);
+    const char *folder = job->folder ? job->folder : own;
+    code = folder ? plan_into(scene, folder, job, text, json) : fail(job, path, MORPH_ERR_NOMEM);
+    free(own);
+    morph_scene_destroy(scene);
+    return code;
+}
+
+static morph_status check_schedule_file(const morph_record *record, const char *file, char *message,
+                                        size_t size, morph_check_report *report) {
+    double *time = NULL, *length = NULL;
+    int samples = 0;
+    morph_status status = morph_schedule_read(file, record->links, &time, &length, &samples, message, size);
+    if (status == MORPH_OK) status = morph_check_lengths(record, time, length, samples, report);
+    free(time);
+    free(length);
+    return status;
+}
+
+int morph_check_folder(const char *folder, const char *schedule, const morph_job *job, char **text) {
+    if (text) *text = NULL;
+    char message[512] = "";
+    morph_record record = {0};
+    morph_check_report report = {0};
+    morph_blas_threads(1);
+    morph_status status = morph_folder_read(folder, &record, message, sizeof message);
+    if (status == MORPH_OK && schedule)
+        status = check_schedule_file(&record, schedule, message, sizeof message, &report);
+    else if (status == MORPH_OK) {
+        const morph_control control = {job->stop, job->progress, job->log, job->user};
+        status = morph_check_record(&record, &control, &report);
+    }
+    morph_record_free(&record);
+    if (status != MORPH_OK) {
+        if (!message[0]) return fail(job, folder, status);
+        say(job, message);
+        return exit_of(status);
+    }
+    if (text) *text = morph_check_text(&report);
+    return report.feasible ? MORPH_EXIT_DONE : MORPH_EXIT_INFEASIBLE;
+}
+
+int morph_picture_folder(const char *folder, const char *file, const morph_job *job) {
+    char message[512] = "";
+    morph_record record = {0};
+    morph_status status = morph_folder_read(folder, &record, message, sizeof message);
+    if (status == MORPH_OK) status = morph_picture_write(&record, NULL, file, message, sizeof message);
+    morph_record_free(&record);
+    if (status == MORPH_OK) return MORPH_EXIT_DONE;
+    if (!message[0]) return fail(job, folder, status);
+    say(job, message);
+    return exit_of(status);
+}
+
+int morph_info_scene(const char *path, const morph_job *job, char **text) {
+    if (text) *text = NULL;
+    morph_scene *scene = NULL;
+    const int code = read_scene(path, job, &scene);
+    if (code != MORPH_EXIT_DONE) return code;
+    morph_structure *s = NULL;
+    morph_mobility mobility;
+    morph_blas_threads(1);
+    morph_status status = morph_structure_create(&scene->structure, &s);
+    if (status == MORPH_OK) status = morph_mobility_at(s, s->start, &mobility);
+    if (status == MORPH_OK && text) *text = morph_info_text(scene, s, &mobility);
+    morph_structure_destroy(s);
+    morph_scene_destroy(scene);
+    return status == MORPH_OK ? MORPH_EXIT_DONE : fail(job, path, status);
+}

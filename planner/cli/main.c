@@ -1,0 +1,307 @@
+/* The program: arguments in, one public call, text out. */
+#include "planner/morphplan.h"
+
+#include <getopt.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static const char usage_text[] =
+    "usage: morphplan COMMAND ...\n"
+    "\n"
+    "  plan SCENE [-o DIR]                plan a morph and write the plan folder (default: SCENE without "
+    "ending + .plan)\n"
+    "  check DIR [--schedule FILE]        verify a plan folder, or a schedule file against its plan\n"
+    "  picture DIR -o FILE.svg|png        still pictures: four moments, lengths over time\n"
+    "  info SCENE                         structure with link numbers, mobility, target; solves nothing\n"
+    "\n"
+    "options of plan:\n"
+    "  --method ipopt|blanket             refined plan (default), or the pure blanket as it fell\n"
+    "  --overwrite                        exchange an existing plan folder\n"
+    "  --json                             print the summary as JSON instead of six lines\n"
+    "  --quiet                            no progress\n"
+    "  --verbose                          what the solvers do, on stderr\n"
+    "\n"
+    "  --help, --version\n"
+    "\n"
+    "exit codes: 0 done, every check holds; 1 internal error or machine refused; 2 wrong usage or input;\n"
+    "3 no feasible plan, or findings; 4 interrupted, best so far kept\n";
+
+static volatile sig_atomic_t interrupted;
+
+/* The first signal asks for the best so far; the second ends the program at once (nothing half-written is
+ * under a plan's name). */
+static void on_signal(int number) {
+    interrupted = 1;
+    signal(number, SIG_DFL);
+}
+
+static int ask_stop(void *user) {
+    (void)user;
+    return interrupted != 0;
+}
+
+typedef struct screen {
+    bool terminal, quiet, verbose;
+    double started;
+    char stage[32];
+    int percent;
+    bool bar; /* a bar stands on the line */
+} screen;
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void clear_bar(screen *s) {
+    if (s->bar) fprintf(stderr, "\r\033[K");
+    s->bar = false;
+}
+
+static void on_message(void *user, const char *line) {
+    clear_bar(user);
+    fprintf(stderr, "%s\n", line);
+}
+
+static void on_log(void *user, const char *line) {
+    screen *s = user;
+    if (!s->verbose) return;
+    clear_bar(s);
+    fprintf(stderr, "  %s\n", line);
+}
+
+/* A bar with stage, elapsed and remaining time on a terminal; a plain line per stage when piped. */
+static void on_progress(void *user, const char *stage, double fraction) {
+    screen *s = user;
+    if (s->quiet) return;
+    const int percent = (int)(100.0 * fraction);
+    const bool fresh = strcmp(stage, s->stage) != 0;
+    if (!fresh && percent == s->percent) return;
+    const double elapsed = now() - s->started;
+    static double stage_started;
+    if (fresh) stage_started = elapsed;
+    snprintf(s->stage, sizeof s->stage, "%s", stage);
+    s->percent = percent;
+    if (!s->terminal) {
+        if (fresh) fprintf(stderr, "%7.1f s  %s\n", elapsed, stage);
+        return;
+    }
+    char bar[31];
+    for (int i = 0; i < 30; i++)
+        bar[i] = i * 100 < percent * 30 ? '#' : '.';
+    bar[30] = '\0';
+    fprintf(stderr, "\r\033[K%-8s [%s] %5.1f s", stage, bar, elapsed);
+    if (fraction > 0.05)
+        fprintf(stderr, ", about %.0f s left in this stage",
+                (elapsed - stage_started) * (1.0 - fraction) / fraction);
+    fflush(stderr);
+    s->bar = true;
+}
+
+static int usage_fault(const char *what, const char *value, const char *allowed) {
+    fprintf(stderr, "morphplan: %s%s%s; allowed: %s\n", what, value[0] ? ": " : "", value, allowed);
+    return MORPH_EXIT_INPUT;
+}
+
+static int not_yet(const char *what) {
+    fprintf(stderr, "morphplan: not available yet: %s\n", what);
+    return MORPH_EXIT_INPUT;
+}
+
+static bool positive_number(const char *text) {
+    char *end;
+    const double v = strtod(text, &end);
+    return end != text && *end == '\0' && v > 0.0 && v < 1e300;
+}
+
+/* Results are worth nothing if they did not arrive: a full disk behind a redirected stdout is an error. */
+static int print_result(const char *text, int code) {
+    if (!text) return code;
+    if (fputs(text, stdout) == EOF || fflush(stdout) == EOF) {
+        fprintf(stderr, "morphplan: standard output: cannot write\n");
+        return MORPH_EXIT_INTERNAL;
+    }
+    return code;
+}
+
+enum {
+    O_METHOD = 256,
+    O_LEVEL,
+    O_BUDGET,
+    O_OVERWRITE,
+    O_JSON,
+    O_QUIET,
+    O_VERBOSE,
+    O_THREADS,
+    O_SCHEDULE,
+    O_HELP,
+    O_VERSION
+};
+
+typedef struct arguments {
+    const char *output, *method, *schedule, *subject;
+    bool overwrite, json, quiet, verbose;
+} arguments;
+
+/* Validates an option's value and refuses what belongs to a later version by name. 0: go on. */
+static int take_option(int option, const char *value, arguments *a) {
+    switch (option) {
+    case 'o':
+        a->output = value;
+        return value[0] ? 0 : usage_fault("-o", "empty", "a path");
+    case O_METHOD:
+        a->method = value;
+        if (strcmp(value, "nlopt") == 0) return not_yet("--method nlopt");
+        if (strcmp(value, "ipopt") != 0 && strcmp(value, "blanket") != 0)
+            return usage_fault("--method", value, "ipopt, blanket");
+        return 0;
+    case O_LEVEL:
+        if (strcmp(value, "standard") == 0) return 0;
+        if (strcmp(value, "draft") == 0 || strcmp(value, "fine") == 0)
+            return not_yet(value[0] == 'd' ? "--level draft" : "--level fine");
+        return usage_fault("--level", value, "draft, standard, fine");
+    case O_BUDGET:
+        return positive_number(value) ? not_yet("--budget")
+                                      : usage_fault("--budget", value, "seconds above 0");
+    case O_THREADS:
+        if (strcmp(value, "1") == 0) return 0;
+        return positive_number(value) ? not_yet("--threads above 1") : usage_fault("--threads", value, "1");
+    case O_OVERWRITE:
+        a->overwrite = true;
+        return 0;
+    case O_JSON:
+        a->json = true;
+        return 0;
+    case O_QUIET:
+        a->quiet = true;
+        return 0;
+    case O_VERBOSE:
+        a->verbose = true;
+        return 0;
+    case O_SCHEDULE:
+        a->schedule = value;
+        return 0;
+    case O_HELP:
+        fputs(usage_text, stdout);
+        exit(MORPH_EXIT_DONE);
+    case O_VERSION:
+        printf("morphplan %s\n", morph_version());
+        exit(MORPH_EXIT_DONE);
+    default:
+        fprintf(stderr, "try: morphplan --help\n");
+        return MORPH_EXIT_INPUT;
+    }
+}
+
+static int read_arguments(int argc, char **argv, arguments *a) {
+    static const struct option options[] = {{"method", required_argument, NULL, O_METHOD},
+                                            {"level", required_argument, NULL, O_LEVEL},
+                                            {"budget", required_argument, NULL, O_BUDGET},
+                                            {"overwrite", no_argument, NULL, O_OVERWRITE},
+                                            {"json", no_argument, NULL, O_JSON},
+                                            {"quiet", no_argument, NULL, O_QUIET},
+                                            {"verbose", no_argument, NULL, O_VERBOSE},
+                                            {"threads", required_argument, NULL, O_THREADS},
+                                            {"schedule", required_argument, NULL, O_SCHEDULE},
+                                            {"help", no_argument, NULL, O_HELP},
+                                            {"version", no_argument, NULL, O_VERSION},
+                                            {NULL, 0, NULL, 0}};
+    int option;
+    while ((option = getopt_long(argc, argv, "o:", options, NULL)) != -1) {
+        const int code = take_option(option, optarg, a);
+        if (code != 0) return code;
+    }
+    if (argc - optind != 1)
+        return usage_fault(argc - optind < 1 ? "nothing to work on" : "too many arguments",
+                           argc - optind < 1 ? "" : argv[optind + 1], "one scene or plan folder");
+    a->subject = argv[optind];
+    return 0;
+}
+
+static morph_job make_job(const arguments *a, screen *s) {
+    *s = (screen){
+        .terminal = isatty(STDERR_FILENO) != 0, .quiet = a->quiet, .verbose = a->verbose, .started = now()};
+    morph_job job = morph_job_defaults();
+    job.folder = a->output;
+    if (a->method) job.method = a->method;
+    job.overwrite = a->overwrite;
+    job.message = on_message;
+    job.log = on_log;
+    job.progress = on_progress;
+    job.stop = ask_stop;
+    job.user = s;
+    return job;
+}
+
+static int run_plan(const arguments *a) {
+    screen s;
+    const morph_job job = make_job(a, &s);
+    char *text = NULL, *json = NULL;
+    int code = morph_plan_scene(a->subject, &job, &text, a->json ? &json : NULL);
+    clear_bar(&s);
+    code = print_result(a->json ? json : text, code);
+    free(text);
+    free(json);
+    return code;
+}
+
+static int run_check(const arguments *a) {
+    screen s;
+    const morph_job job = make_job(a, &s);
+    char *text = NULL;
+    int code = morph_check_folder(a->subject, a->schedule, &job, &text);
+    clear_bar(&s);
+    code = print_result(text, code);
+    free(text);
+    return code;
+}
+
+static int run_picture(const arguments *a) {
+    screen s;
+    const morph_job job = make_job(a, &s);
+    if (!a->output) return usage_fault("picture", "no -o", "-o FILE.svg or -o FILE.png");
+    return morph_picture_folder(a->subject, a->output, &job);
+}
+
+static int run_info(const arguments *a) {
+    screen s;
+    const morph_job job = make_job(a, &s);
+    char *text = NULL;
+    int code = morph_info_scene(a->subject, &job, &text);
+    code = print_result(text, code);
+    free(text);
+    return code;
+}
+
+int main(int argc, char **argv) {
+    static const struct {
+        const char *name;
+        int (*run)(const arguments *);
+    } commands[] = {{"plan", run_plan}, {"check", run_check}, {"picture", run_picture}, {"info", run_info},
+                    {"compare", NULL},  {"export", NULL},     {"trade", NULL}};
+    arguments a = {0};
+    if (argc < 2) {
+        fputs(usage_text, stderr);
+        return MORPH_EXIT_INPUT;
+    }
+    if (argv[1][0] == '-') {
+        const int code = read_arguments(argc, argv, &a);
+        return code ? code : usage_fault("no command", "", "plan, check, picture, info");
+    }
+    for (size_t k = 0; k < sizeof commands / sizeof *commands; k++) {
+        if (strcmp(argv[1], commands[k].name) != 0) continue;
+        if (!commands[k].run) return not_yet(commands[k].name);
+        const int code = read_arguments(argc - 1, argv + 1, &a);
+        if (code) return code;
+        struct sigaction action = {.sa_handler = on_signal};
+        sigaction(SIGINT, &action, NULL);
+        sigaction(SIGTERM, &action, NULL);
+        return commands[k].run(&a);
+    }
+    return usage_fault("unknown command", argv[1], "plan, check, picture, info");
+}

@@ -1,0 +1,119 @@
+#include "planner/curve.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+morph_status morph_curve_create(const morph_structure *s, const double *parameter, const double *joints,
+                                int poses, morph_curve **out) {
+    *out = NULL;
+    morph_curve *c = calloc(1, sizeof *c);
+    if (!c) return MORPH_ERR_NOMEM;
+    const int width = 6 * s->posts;
+    c->structure = s;
+    c->poses = poses;
+    c->s = morph_alloc((size_t)poses, sizeof(double));
+    c->pose = morph_alloc((size_t)poses * (size_t)width, sizeof(double));
+    morph_status status = c->s && c->pose ? MORPH_OK : MORPH_ERR_NOMEM;
+    if (status == MORPH_OK) {
+        memcpy(c->s, parameter, (size_t)poses * sizeof *c->s);
+        for (int k = 0; k < poses; k++)
+            for (int p = 0; p < s->posts; p++) {
+                const double *x = &joints[(size_t)k * 3 * (size_t)s->joints];
+                const double *b = &x[3 * s->post[p][0]], *t = &x[3 * s->post[p][1]], h = morph_dist(b, t);
+                double *y = &c->pose[(size_t)k * (size_t)width + 6 * (size_t)p];
+                for (int m = 0; m < 3; m++) {
+                    y[m] = 0.5 * (b[m] + t[m]);
+                    y[3 + m] = (t[m] - b[m]) / h;
+                }
+            }
+        status = morph_spline_fit(c->s, c->pose, poses, width, &c->spline);
+    }
+    if (status != MORPH_OK) {
+        morph_curve_destroy(c);
+        return status;
+    }
+    *out = c;
+    return MORPH_OK;
+}
+
+void morph_curve_destroy(morph_curve *c) {
+    if (!c) return;
+    free(c->s);
+    free(c->pose);
+    morph_spline_free(&c->spline);
+    free(c);
+}
+
+/* Truncated Taylor arithmetic: coefficient k of a jet is the k-th derivative over k!. */
+static const double factorial[MORPH_JET] = {1.0, 1.0, 2.0, 6.0, 24.0, 120.0};
+
+static void jet_dot(const double (*u)[MORPH_JET], const double (*v)[MORPH_JET], int order, double *out) {
+    for (int k = 0; k <= order; k++) {
+        out[k] = 0.0;
+        for (int c = 0; c < 3; c++)
+            for (int i = 0; i <= k; i++)
+                out[k] += u[c][i] * v[c][k - i];
+    }
+}
+
+/* r = sqrt(a): r r = a, solved coefficient by coefficient. */
+static void jet_sqrt(const double *a, int order, double *r) {
+    r[0] = sqrt(a[0]);
+    for (int k = 1; k <= order; k++) {
+        double sum = a[k];
+        for (int i = 1; i < k; i++)
+            sum -= r[i] * r[k - i];
+        r[k] = sum / (2.0 * r[0]);
+    }
+}
+
+/* q = a / b: q b = a. q may alias a. */
+static void jet_divide(const double *a, const double *b, int order, double *q) {
+    for (int k = 0; k <= order; k++) {
+        double sum = a[k];
+        for (int i = 0; i < k; i++)
+            sum -= q[i] * b[k - i];
+        q[k] = sum / b[0];
+    }
+}
+
+void morph_curve_joints(const morph_curve *curve, double s, int order, double *scratch, double *out) {
+    const morph_structure *st = curve->structure;
+    const size_t width = 6 * (size_t)st->posts, coordinates = 3 * (size_t)st->joints;
+    morph_spline_eval(&curve->spline, s, order, scratch);
+    for (int p = 0; p < st->posts; p++) {
+        double q[3][MORPH_JET], square[MORPH_JET], norm[MORPH_JET];
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k <= order; k++)
+                q[c][k] = scratch[(size_t)k * width + 6 * (size_t)p + 3 + (size_t)c] / factorial[k];
+        jet_dot((const double(*)[MORPH_JET])q, (const double(*)[MORPH_JET])q, order, square);
+        jet_sqrt(square, order, norm);
+        const size_t b = 3 * (size_t)st->post[p][0], t = 3 * (size_t)st->post[p][1];
+        for (size_t c = 0; c < 3; c++) {
+            jet_divide(q[c], norm, order, q[c]);
+            for (int k = 0; k <= order; k++) {
+                const double centre = scratch[(size_t)k * width + 6 * (size_t)p + c];
+                const double half = 0.5 * st->post_length[p] * q[c][k] * factorial[k];
+                out[(size_t)k * coordinates + b + c] = centre - half;
+                out[(size_t)k * coordinates + t + c] = centre + half;
+            }
+        }
+    }
+}
+
+void morph_curve_lengths(const morph_structure *st, const double *joints, int order, double *out) {
+    const size_t coordinates = 3 * (size_t)st->joints;
+    for (int l = 0; l < st->links; l++) {
+        double d[3][MORPH_JET], square[MORPH_JET], length[MORPH_JET];
+        const size_t a = 3 * (size_t)st->link[l][0], b = 3 * (size_t)st->link[l][1];
+        for (size_t c = 0; c < 3; c++)
+            for (int k = 0; k <= order; k++)
+                d[c][k] =
+                    (joints[(size_t)k * coordinates + b + c] - joints[(size_t)k * coordinates + a + c]) /
+                    factorial[k];
+        jet_dot((const double(*)[MORPH_JET])d, (const double(*)[MORPH_JET])d, order, square);
+        jet_sqrt(square, order, length);
+        for (int k = 0; k <= order; k++)
+            out[(size_t)k * (size_t)st->links + (size_t)l] = length[k] * factorial[k];
+    }
+}

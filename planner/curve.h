@@ -1,0 +1,33 @@
+/* The path as a curve: one spline through poses, each pose a centre and a direction per post, so that posts
+ * are rigid at every parameter and lengths, being distances of joints, fit a shape at every parameter. */
+#ifndef MORPH_CURVE_H
+#define MORPH_CURVE_H
+
+#include "model/structure.h"
+#include "planner/spline.h"
+
+/* Derivatives by s that the curve can give: 0..5. */
+enum { MORPH_JET = 6 };
+
+typedef struct morph_curve {
+    const morph_structure *structure;
+    int poses;
+    double *s;    /* poses; from 0 to 1 */
+    double *pose; /* poses x 6*posts: centre (3), direction (3) per post */
+    morph_spline spline;
+} morph_curve;
+
+/* Joints (poses x 3*joints, metres) at parameters s. Directions are those of the posts, unit length.
+ * Six poses at least. */
+morph_status morph_curve_create(const morph_structure *structure, const double *s, const double *joints,
+                                int poses, morph_curve **out);
+void morph_curve_destroy(morph_curve *curve);
+
+/* Joints at s and their derivatives 0..order (<= 5): out is (order + 1) x 3*joints. scratch: (order + 1) x
+ * 6*posts. */
+void morph_curve_joints(const morph_curve *curve, double s, int order, double *scratch, double *out);
+
+/* Lengths from joint derivatives as above: out is (order + 1) x links. */
+void morph_curve_lengths(const morph_structure *structure, const double *joints, int order, double *out);
+
+#endif

@@ -1,0 +1,61 @@
+/* morphplan: from a scene to actuator length schedules that are checked against every limit.
+ *
+ * The public interface, one header. Every call does one whole job, keeps no global state, prints nothing and
+ * returns an exit code as the program does. Calls may run in one process side by side; solver runs inside
+ * them take turns. Texts handed out are freed by the caller with free(). */
+#ifndef MORPHPLAN_H
+#define MORPHPLAN_H
+
+#include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define MORPH_API __attribute__((visibility("default")))
+#else
+#define MORPH_API
+#endif
+
+enum morph_exit {
+    MORPH_EXIT_DONE = 0,       /* done, and every check holds */
+    MORPH_EXIT_INTERNAL = 1,   /* internal error, or memory or disk refused: nothing half-written is left */
+    MORPH_EXIT_INPUT = 2,      /* wrong usage or input: nothing written */
+    MORPH_EXIT_INFEASIBLE = 3, /* no feasible plan; check: findings */
+    MORPH_EXIT_STOPPED = 4     /* stopped by the caller: the folder holds the best so far, marked so */
+};
+
+/* How a job runs. Any pointer may be NULL. Callbacks come on the caller's thread. */
+typedef struct morph_job {
+    const char *folder; /* plan folder; NULL: the scene's path without ending, + ".plan" */
+    const char *method; /* "ipopt" (default) or "blanket" */
+    bool overwrite;     /* exchange an existing plan folder */
+    void (*message)(void *user, const char *line);                    /* faults and warnings, one line each */
+    void (*log)(void *user, const char *line);                        /* what the solvers do, one line each */
+    void (*progress)(void *user, const char *stage, double fraction); /* fraction of that stage */
+    int (*stop)(void *user); /* nonzero: stop soon with the best so far */
+    void *user;
+} morph_job;
+
+MORPH_API morph_job morph_job_defaults(void);
+MORPH_API const char *morph_version(void);
+
+/* Plans a scene file and writes the plan folder. text: the six lines of the outcome; json: summary.json's
+ * content; either may be NULL. They come back NULL where there is no plan. */
+MORPH_API int morph_plan_scene(const char *scene, const morph_job *job, char **text, char **json);
+
+/* Verifies a plan folder, or a schedule file (schedule: CSV, may be NULL) against its plan. text: a table of
+ * the margins. */
+MORPH_API int morph_check_folder(const char *folder, const char *schedule, const morph_job *job, char **text);
+
+/* Draws a plan folder into file (.svg or .png). */
+MORPH_API int morph_picture_folder(const char *folder, const char *file, const morph_job *job);
+
+/* Structure, numbering, mobility and target of a scene; solves nothing. */
+MORPH_API int morph_info_scene(const char *scene, const morph_job *job, char **text);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,320 @@
+/* Poses are taken from the guide at even progress and bent towards the end pose; each is moved the least that
+ * its limits (with an inset) ask; a spline goes through them; where it breaks a limit between poses, a pose
+ * is inserted and the spline drawn anew. */
+#include "planner/path.h"
+#include "planner/refine.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { FINE = 12 }; /* points examined per interval */
+
+morph_path_options morph_path_defaults(void) {
+    return (morph_path_options){.end = {.length = 1e-3, .angle = 2e-3, .clearance = 1e-3, .self = 1e-3},
+                                .interior = {.length = 0.02, .angle = 0.03, .clearance = 0.06, .self = 0.02},
+                                .intervals = 12,
+                                .poses = 64,
+                                .refine = true};
+}
+
+typedef struct pather {
+    const morph_world *world;
+    const morph_path_options *options;
+    morph_path_report *report;
+    int coordinates, count, capacity;
+    double *s;      /* capacity: parameter */
+    double *x;      /* capacity x coordinates, scaled */
+    double *inset;  /* capacity: extra factor on the inset of a pose */
+    double *metres; /* capacity x coordinates */
+    double *lower;
+    double started;
+} pather;
+
+static double *pose(pather *p, int k) {
+    return &p->x[(size_t)k * (size_t)p->coordinates];
+}
+
+static double rms(const double *a, const double *b, int n) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++)
+        sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sqrt(3.0 * sum / n);
+}
+
+static double smooth_step(double t) {
+    t = fmin(1.0, fmax(0.0, t));
+    return t * t * (3.0 - 2.0 * t);
+}
+
+/* First frame at which the guide has come a fraction of the way from its start to its end. */
+static int frame_at(const morph_trajectory *guide, int n, double fraction) {
+    const double *end = &guide->x[(size_t)(guide->frames - 1) * (size_t)n];
+    const double all = rms(guide->x, end, n);
+    for (int f = 0; f < guide->frames; f++)
+        if (rms(&guide->x[(size_t)f * (size_t)n], end, n) <= (1.0 - fraction) * all) return f;
+    return guide->frames - 1;
+}
+
+static void set_guided_poses(pather *p, const morph_trajectory *guide, const double *start,
+                             const double *end) {
+    const int n = p->coordinates;
+    const double a = p->world->structure->spacing;
+    const double *last = &guide->x[(size_t)(guide->frames - 1) * (size_t)n];
+    p->count = p->options->intervals + 1;
+    for (int k = 0; k < p->count; k++) {
+        const double progress = (double)k / (p->count - 1), bend = smooth_step(progress);
+        const double *frame = &guide->x[(size_t)frame_at(guide, n, progress) * (size_t)n];
+        for (int i = 0; i < n; i++) {
+            double at = frame[i] + bend * (end[i] - last[i]);
+            if (k == 0) at = start[i];
+            if (k == p->count - 1) at = end[i];
+            pose(p, k)[i] = at / a;
+        }
+        p->inset[k] = 1.0;
+    }
+}
+
+/* Full inset away from the end, down to the end's own over the last quarter of the way. */
+static morph_inset inset_at(const pather *p, double s, double factor) {
+    const double f = factor * fmin(1.0, (1.0 - s) / 0.25);
+    const morph_inset *e = &p->options->end, *i = &p->options->interior;
+    return (morph_inset){e->length + f * (i->length - e->length), e->angle + f * (i->angle - e->angle),
+                         e->clearance + f * (i->clearance - e->clearance), e->self + f * (i->self - e->self)};
+}
+
+static morph_status solve_once(pather *p, double *x, const double *reference, const morph_inset *inset,
+                               morph_active *active, morph_nlp_result *result) {
+    morph_block blocks[MORPH_POSE_BLOCKS + 1];
+    int count = morph_active_blocks(active, p->world, NULL, inset, blocks);
+    if (count < 0) return MORPH_ERR_NOMEM;
+    morph_near_term near = {p->coordinates, reference, 1.0};
+    blocks[count++] = morph_block_near(&near, NULL);
+    morph_nlp *nlp = NULL;
+    morph_status status = morph_nlp_create(p->coordinates, x, p->lower, NULL, blocks, count, NULL, 0, &nlp);
+    if (status != MORPH_OK) return status;
+    morph_nlp_options o = morph_nlp_defaults();
+    o.tolerance = 1e-5; /* of an objective in spacings^2: moves no joint by a hundredth of a link's radius */
+    o.max_iterations = 80;
+    o.mu_init = 1e-2;
+    o.control = p->options->control;
+    status = morph_nlp_solve(nlp, x, &o, result);
+    morph_nlp_destroy(nlp);
+    if (status != MORPH_OK) return status;
+    p->report->solves++;
+    p->report->iterations += result->iterations;
+    p->report->linear_seconds += result->linear_seconds;
+    p->report->callback_seconds += result->callback_seconds;
+    p->report->unknowns = result->unknowns;
+    if (result->rows > p->report->rows_used) p->report->rows_used = result->rows;
+    memcpy(x, result->x, (size_t)p->coordinates * sizeof *x);
+    return MORPH_OK;
+}
+
+/* Moves pose k the least from where it stands so that it holds its limits with its inset. */
+static morph_status solve_pose(pather *p, int k) {
+    const morph_inset inset = inset_at(p, p->s[k], p->inset[k]);
+    /* Rows enter well before their limits: a pose moves little. */
+    const morph_nearness near = {.length = 0.05, .angle = 0.08, .clearance = 0.1, .self = 0.05};
+    morph_active *active = NULL;
+    double *reference = morph_alloc((size_t)p->coordinates, sizeof(double));
+    morph_status status = reference ? morph_active_create(p->world->structure, &active) : MORPH_ERR_NOMEM;
+    morph_violation v;
+    if (status == MORPH_OK) {
+        memcpy(reference, pose(p, k), (size_t)p->coordinates * sizeof *reference);
+        morph_pose_bounds(p->world, inset.clearance, p->lower);
+        status = morph_pose_examine(p->world, pose(p, k), &inset, &near, active, NULL, &v);
+    }
+    for (int round = 0; round < 5 && status == MORPH_OK; round++) {
+        morph_nlp_result result = {0};
+        status = solve_once(p, pose(p, k), reference, &inset, active, &result);
+        if (status != MORPH_OK) break;
+        int added = 0;
+        status = morph_pose_examine(p->world, pose(p, k), &inset, &near, active, &added, &v);
+        const double worst = morph_violation_worst(&v, morph_pose_tolerance, NULL);
+        const int solved = result.outcome == MORPH_OPTIMAL || result.outcome == MORPH_FEASIBLE;
+        morph_nlp_result_free(&result);
+        if (worst <= 1.0 && (solved || round > 0)) break;
+    }
+    morph_active_destroy(active);
+    free(reference);
+    return status;
+}
+
+/* Parameter by chord length, so that the spline sees even speed. */
+static void set_parameters(pather *p) {
+    p->s[0] = 0.0;
+    for (int k = 1; k < p->count; k++)
+        p->s[k] = p->s[k - 1] + 1e-6 + rms(pose(p, k), pose(p, k - 1), p->coordinates);
+    for (int k = 1; k < p->count; k++)
+        p->s[k] /= p->s[p->count - 1];
+    p->s[p->count - 1] = 1.0;
+}
+
+static morph_status draw_curve(pather *p, morph_curve **out) {
+    const double a = p->world->structure->spacing;
+    const size_t all = (size_t)p->count * (size_t)p->coordinates;
+    for (size_t i = 0; i < all; i++)
+        p->metres[i] = p->x[i] * a;
+    morph_curve_destroy(*out);
+    return morph_curve_create(p->world->structure, p->s, p->metres, p->count, out);
+}
+
+typedef struct breach {
+    double worst, s;
+    morph_limit limit;
+} breach;
+
+/* Examines the curve between poses: the worst breach of every interval, and the worst violation of all. */
+static morph_status examine_curve(pather *p, const morph_curve *curve, breach *breaches) {
+    const morph_structure *st = p->world->structure;
+    double *scratch = morph_alloc(6 * (size_t)st->posts, sizeof(double));
+    double *x = morph_alloc((size_t)p->coordinates, sizeof(double));
+    morph_status status = scratch && x ? MORPH_OK : MORPH_ERR_NOMEM;
+    morph_path_report *r = p->report;
+    for (int l = 0; l < MORPH_LIMITS; l++)
+        r->violation.amount[l] = -INFINITY;
+    for (int k = 0; k + 1 < p->count && status == MORPH_OK; k++) {
+        breaches[k] = (breach){.worst = -INFINITY, .s = p->s[k]};
+        for (int f = 0; f <= FINE && status == MORPH_OK; f++) {
+            const double s = p->s[k] + (p->s[k + 1] - p->s[k]) * f / FINE;
+            morph_violation v;
+            morph_curve_joints(curve, s, 0, scratch, x);
+            for (int i = 0; i < p->coordinates; i++)
+                x[i] /= st->spacing;
+            status = morph_pose_examine(p->world, x, NULL, NULL, NULL, NULL, &v);
+            morph_limit which = MORPH_LIMIT_POST;
+            const double worst = morph_violation_worst(&v, morph_pose_tolerance, &which);
+            if (worst > breaches[k].worst) breaches[k] = (breach){worst, s, which};
+            for (int l = 0; l < MORPH_LIMITS; l++)
+                if (v.amount[l] > r->violation.amount[l]) {
+                    r->violation.amount[l] = v.amount[l];
+                    memcpy(r->violation.element[l], v.element[l], sizeof v.element[l]);
+                    r->where[l] = s;
+                }
+        }
+    }
+    free(scratch);
+    free(x);
+    return status;
+}
+
+static bool make_room(pather *p) {
+    if (p->count < p->capacity) return true;
+    const int next = 2 * p->capacity;
+    const size_t rows = (size_t)next, width = (size_t)p->coordinates;
+    double *s = realloc(p->s, rows * sizeof *s);
+    if (s) p->s = s;
+    double *x = realloc(p->x, rows * width * sizeof *x);
+    if (x) p->x = x;
+    double *inset = realloc(p->inset, rows * sizeof *inset);
+    if (inset) p->inset = inset;
+    double *metres = realloc(p->metres, rows * width * sizeof *metres);
+    if (metres) p->metres = metres;
+    if (!s || !x || !inset || !metres) return false;
+    p->capacity = next;
+    return true;
+}
+
+/* A pose between k and k + 1, taken from the curve at s and moved inside its limits. */
+static morph_status insert_pose(pather *p, const morph_curve *curve, int k, double s) {
+    if (!make_room(p)) return MORPH_ERR_NOMEM;
+    const size_t width = (size_t)p->coordinates, after = (size_t)(p->count - k - 1);
+    memmove(&p->s[k + 2], &p->s[k + 1], after * sizeof *p->s);
+    memmove(&p->inset[k + 2], &p->inset[k + 1], after * sizeof *p->inset);
+    memmove(pose(p, k + 2), pose(p, k + 1), after * width * sizeof *p->x);
+    p->count++;
+    p->s[k + 1] = s;
+    p->inset[k + 1] = 0.5 * (p->inset[k] + p->inset[k + 2]);
+    double *scratch = morph_alloc(6 * (size_t)p->world->structure->posts, sizeof(double));
+    if (!scratch) return MORPH_ERR_NOMEM;
+    morph_curve_joints(curve, s, 0, scratch, pose(p, k + 1));
+    free(scratch);
+    for (int i = 0; i < p->coordinates; i++)
+        pose(p, k + 1)[i] /= p->world->structure->spacing;
+    p->report->inserted++;
+    return solve_pose(p, k + 1);
+}
+
+/* Inserts a pose into every interval that breaks a limit; false in *changed when nothing could be inserted.
+ */
+static morph_status mend(pather *p, const morph_curve *curve, const breach *breaches, bool *changed) {
+    *changed = false;
+    const int before = p->count;
+    for (int k = before - 2; k >= 0; k--) {
+        if (breaches[k].worst <= 1.0 || p->count >= p->options->poses) continue;
+        /* Poses closer than this make the spline stiff rather than right. */
+        const double gap = p->s[k + 1] - p->s[k];
+        if (gap < 2e-3) continue;
+        const double s = fmin(p->s[k + 1] - 0.25 * gap, fmax(p->s[k] + 0.25 * gap, breaches[k].s));
+        const morph_status status = insert_pose(p, curve, k, s);
+        if (status != MORPH_OK) return status;
+        *changed = true;
+    }
+    return MORPH_OK;
+}
+
+static bool out_of_time(const pather *p) {
+    return morph_stopped(p->options->control) ||
+           (p->options->seconds > 0.0 && morph_seconds() - p->started > p->options->seconds);
+}
+
+static morph_status run(pather *p, morph_curve **curve) {
+    morph_status status = MORPH_OK;
+    set_parameters(p);
+    for (int k = 1; k + 1 < p->count && status == MORPH_OK && p->options->refine; k++) {
+        status = solve_pose(p, k);
+        morph_progress(p->options->control, "path", 0.7 * k / p->count);
+        if (status == MORPH_OK && morph_stopped(p->options->control)) status = MORPH_ERR_STOPPED;
+    }
+    if (status == MORPH_OK) set_parameters(p);
+    for (int round = 0; round < 12 && status == MORPH_OK; round++) {
+        breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
+        if (!breaches) return MORPH_ERR_NOMEM;
+        status = draw_curve(p, curve);
+        if (status == MORPH_OK) status = examine_curve(p, *curve, breaches);
+        morph_limit which = MORPH_LIMIT_POST;
+        const double worst = morph_violation_worst(&p->report->violation, morph_pose_tolerance, &which);
+        morph_log(p->options->control, "path: %d poses: worst %s %.3g at %.3f (%s)", p->count,
+                  morph_limit_name(which), p->report->violation.amount[which], p->report->where[which],
+                  p->report->violation.element[which]);
+        bool changed = false;
+        p->report->feasible = status == MORPH_OK && worst <= 1.0;
+        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !out_of_time(p))
+            status = mend(p, *curve, breaches, &changed);
+        free(breaches);
+        if (!changed) break;
+    }
+    return status;
+}
+
+morph_status morph_path_plan(const morph_world *world, const morph_trajectory *guide, const double *start,
+                             const double *end, const morph_path_options *options, morph_curve **out,
+                             morph_path_report *report) {
+    *out = NULL;
+    *report = (morph_path_report){.rows_possible = morph_possible_rows(world->structure)};
+    pather p = {.world = world,
+                .options = options,
+                .report = report,
+                .coordinates = 3 * world->structure->joints,
+                .capacity = options->intervals + 8,
+                .started = morph_seconds()};
+    const size_t rows = (size_t)p.capacity, width = (size_t)p.coordinates;
+    p.s = morph_alloc(rows, sizeof(double));
+    p.x = morph_alloc(rows * width, sizeof(double));
+    p.inset = morph_alloc(rows, sizeof(double));
+    p.metres = morph_alloc(rows * width, sizeof(double));
+    p.lower = morph_alloc(width, sizeof(double));
+    morph_status status = p.s && p.x && p.inset && p.metres && p.lower ? MORPH_OK : MORPH_ERR_NOMEM;
+    if (status == MORPH_OK) {
+        set_guided_poses(&p, guide, start, end);
+        status = run(&p, out);
+    }
+    report->poses = p.count;
+    report->seconds = morph_seconds() - p.started;
+    free(p.s);
+    free(p.x);
+    free(p.inset);
+    free(p.metres);
+    free(p.lower);
+    return status;
+}

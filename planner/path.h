@@ -1,0 +1,36 @@
+/* The path: from the flat start to the refined shape, guided by the blanket's trajectory, every limit held
+ * also between its poses. */
+#ifndef MORPH_PATH_H
+#define MORPH_PATH_H
+
+#include "model/blanket.h"
+#include "planner/curve.h"
+#include "planner/pose.h"
+
+typedef struct morph_path_options {
+    morph_inset end;      /* the inset that the end pose was solved with */
+    morph_inset interior; /* the inset of poses far from the end: room for the spline between them */
+    int intervals;        /* to begin with, at least 8 */
+    int poses;            /* at most, after all insertions */
+    double seconds;       /* wall; <= 0: none */
+    bool refine;          /* false: the guide's poses as they are, nothing solved (the pure blanket) */
+    const morph_control *control;
+} morph_path_options;
+morph_path_options morph_path_defaults(void);
+
+typedef struct morph_path_report {
+    int poses, inserted, solves, iterations;
+    int unknowns, rows_used, rows_possible; /* of the largest solve */
+    double linear_seconds, callback_seconds, seconds;
+    bool feasible;              /* on the fine grid, by exact examination */
+    morph_violation violation;  /* worst over the fine grid */
+    double where[MORPH_LIMITS]; /* parameter of each */
+} morph_path_report;
+
+/* guide: the nominal trajectory; start, end: 3*joints, metres. end must be rigid in its posts. The curve is
+ * returned also where it is not feasible; report says where it breaks. */
+morph_status morph_path_plan(const morph_world *world, const morph_trajectory *guide, const double *start,
+                             const double *end, const morph_path_options *options, morph_curve **out,
+                             morph_path_report *report);
+
+#endif

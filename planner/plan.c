@@ -1,0 +1,248 @@
+#include "planner/plan.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+
+typedef struct planner {
+    const morph_scene *scene;
+    const morph_plan_options *options;
+    morph_plan *plan;
+    morph_workspace work;
+    morph_trajectory nominal;
+    double *end; /* 3*joints: the shape to reach */
+    morph_curve *curve;
+    morph_timing timing;
+    bool stopped;
+    bool optimal;
+    morph_control quiet; /* the caller's control without its stop: after a stop the rest is done cheaply, not
+                            cut short */
+} planner;
+
+/* After a stop the stages go on with what there is. */
+static const morph_control *control_of(const planner *p) {
+    return p->stopped ? &p->quiet : p->options->control;
+}
+
+static void note_time(planner *p, morph_stage stage, double since) {
+    p->plan->summary.seconds[stage] += morph_seconds() - since;
+}
+
+static morph_status stage_target(planner *p) {
+    const double since = morph_seconds();
+    morph_summary *s = &p->plan->summary;
+    morph_progress(control_of(p), "target", 0.0);
+    morph_status status = morph_workspace_create(p->scene, control_of(p), &p->work);
+    if (status == MORPH_OK) {
+        s->sdf_cell = p->work.accuracy.cell;
+        s->sdf_rms = p->work.accuracy.rms;
+        s->sdf_max = p->work.accuracy.max;
+        status =
+            morph_record_structure(&p->plan->record, p->work.structure, &p->scene->target, p->scene->base);
+    }
+    note_time(p, MORPH_STAGE_TARGET, since);
+    return status;
+}
+
+static morph_status stage_nominal(planner *p) {
+    const double since = morph_seconds();
+    const morph_structure *st = p->work.structure;
+    const morph_blanket_def def = morph_scene_blanket(p->scene);
+    morph_summary *s = &p->plan->summary;
+    morph_status status = morph_blanket_run(st, p->work.sdf, p->work.exact, &def, p->work.start,
+                                            control_of(p), &p->nominal, &s->blanket_report);
+    if (status == MORPH_ERR_STOPPED && p->nominal.frames > 0) {
+        p->stopped = true;
+        status = MORPH_OK;
+    }
+    if (status == MORPH_OK) status = morph_record_nominal(&p->plan->record, st, &p->nominal);
+    if (status == MORPH_OK) {
+        const size_t width = 3 * (size_t)st->joints;
+        const double *last = &p->nominal.x[(size_t)(p->nominal.frames - 1) * width];
+        p->end = morph_alloc(width, sizeof(double));
+        if (!p->end) return MORPH_ERR_NOMEM;
+        memcpy(p->end, last, width * sizeof *last);
+        status = morph_cavity_measure(p->work.cavity, last, &s->blanket);
+        s->has_blanket = status == MORPH_OK;
+    }
+    note_time(p, MORPH_STAGE_NOMINAL, since);
+    return status;
+}
+
+static morph_status stage_refine(planner *p) {
+    if (p->options->method == MORPH_METHOD_BLANKET || p->stopped) return MORPH_OK;
+    const double since = morph_seconds();
+    morph_refine_options o = morph_refine_defaults();
+    o.control = control_of(p);
+    morph_refine_report r;
+    morph_status status = morph_refine(&p->work.world, &o, p->end, &r);
+    if (status == MORPH_ERR_STOPPED) {
+        p->stopped = true;
+        status = MORPH_OK;
+    }
+    morph_summary *s = &p->plan->summary;
+    s->iterations_refine = r.iterations;
+    s->unknowns_refine = r.unknowns;
+    s->rows_refine_used = r.rows_used;
+    s->rows_refine_possible = r.rows_possible;
+    s->linear_seconds += r.linear_seconds;
+    s->callback_seconds += r.callback_seconds;
+    p->optimal = p->optimal && r.last == MORPH_OPTIMAL;
+    note_time(p, MORPH_STAGE_REFINE, since);
+    return status;
+}
+
+/* Frames of the guide in which nothing happens, at either end, are dropped: the fall before the first contact
+ * keeps one. */
+static morph_status stage_path(planner *p) {
+    const double since = morph_seconds();
+    morph_path_options o = morph_path_defaults();
+    morph_path_report r;
+    morph_status status = MORPH_OK;
+    for (int attempt = 0; attempt < 2; attempt++) {
+        o.control = control_of(p);
+        o.refine = p->options->method != MORPH_METHOD_BLANKET && !p->stopped;
+        if (!o.refine) o.intervals = 24;
+        morph_curve_destroy(p->curve);
+        p->curve = NULL;
+        status = morph_path_plan(&p->work.world, &p->nominal, p->work.start, p->end, &o, &p->curve, &r);
+        if (status != MORPH_ERR_STOPPED) break;
+        p->stopped = true;
+    }
+    morph_summary *s = &p->plan->summary;
+    s->iterations_path = r.iterations;
+    s->unknowns_path = r.unknowns;
+    s->rows_path_used = r.rows_used;
+    s->rows_path_possible = r.rows_possible;
+    s->linear_seconds += r.linear_seconds;
+    s->callback_seconds += r.callback_seconds;
+    note_time(p, MORPH_STAGE_PATH, since);
+    return status;
+}
+
+static morph_status stage_timing(planner *p) {
+    const double since = morph_seconds();
+    const morph_timing_options o = {p->scene->duration, p->scene->sample, control_of(p)};
+    morph_timing_report r;
+    morph_progress(o.control, "timing", 0.0);
+    morph_status status = morph_timing_solve(p->curve, &o, &p->timing, &r);
+    morph_summary *s = &p->plan->summary;
+    s->iterations_timing = r.iterations;
+    s->linear_seconds += r.linear_seconds;
+    s->duration = p->timing.duration;
+    if (status == MORPH_OK && p->scene->duration > 0.0 && r.needed > p->scene->duration)
+        snprintf(s->reason, sizeof s->reason,
+                 "schedule.duration: %.6g s is too short: this path needs %.6g s", p->scene->duration,
+                 r.needed);
+    if (status == MORPH_OK)
+        status = morph_record_schedule(&p->plan->record, p->curve, &p->timing, p->scene->sample);
+    note_time(p, MORPH_STAGE_TIMING, since);
+    return status;
+}
+
+static morph_status stage_measure(planner *p) {
+    const double since = morph_seconds();
+    morph_record *r = &p->plan->record;
+    morph_summary *s = &p->plan->summary;
+    const size_t width = 3 * (size_t)p->work.structure->joints;
+    morph_progress(control_of(p), "measure", 0.0);
+    morph_status status =
+        morph_cavity_measure(p->work.cavity, &r->schedule_joints[(size_t)(r->samples - 1) * width], &s->plan);
+    s->has_plan = status == MORPH_OK;
+    if (status == MORPH_OK) status = morph_record_mobility(r, p->work.structure);
+    if (status == MORPH_OK) {
+        const int last = r->mobility_samples - 1;
+        s->free_motions = r->mobility_free[last];
+        s->redundant = r->mobility_redundant[last];
+        s->sigma_min = r->mobility_sigma_min[last];
+    }
+    note_time(p, MORPH_STAGE_MEASURE, since);
+    return status;
+}
+
+/* The check alone decides; a duration that cannot be met makes the plan infeasible too. */
+static morph_status stage_check(planner *p) {
+    const double since = morph_seconds();
+    morph_summary *s = &p->plan->summary;
+    morph_progress(control_of(p), "check", 0.0);
+    const morph_status status = morph_check_record(&p->plan->record, &p->quiet, &s->check);
+    note_time(p, MORPH_STAGE_CHECK, since);
+    if (status != MORPH_OK) return status;
+    s->feasible = s->check.feasible && s->reason[0] == '\0';
+    if (!s->check.feasible && s->check.defect[0])
+        snprintf(s->reason, sizeof s->reason, "the schedule is unusable: %s", s->check.defect);
+    else if (!s->check.feasible) {
+        const morph_margin *m = &s->check.margin[s->check.worst];
+        snprintf(s->reason, sizeof s->reason, "%s: %s at %.3f s: beyond by %.3g %s",
+                 morph_margin_name(s->check.worst), m->element, m->time, -m->worst,
+                 morph_margin_unit(s->check.worst));
+    }
+    const morph_outcome outcome = p->stopped     ? MORPH_STOPPED
+                                  : !s->feasible ? MORPH_INFEASIBLE
+                                  : p->optimal   ? MORPH_OPTIMAL
+                                                 : MORPH_FEASIBLE;
+    snprintf(s->outcome, sizeof s->outcome, "%s", morph_outcome_text(outcome));
+    snprintf(p->plan->record.outcome, sizeof p->plan->record.outcome, "%s", s->outcome);
+    return MORPH_OK;
+}
+
+static void describe(planner *p) {
+    morph_summary *s = &p->plan->summary;
+    morph_record *r = &p->plan->record;
+    snprintf(s->title, sizeof s->title, "%s", p->scene->title ? p->scene->title : "");
+    snprintf(s->scene, sizeof s->scene, "%s", p->scene->file ? p->scene->file : "");
+    snprintf(s->method, sizeof s->method, "%s",
+             p->options->method == MORPH_METHOD_BLANKET ? "blanket" : "ipopt");
+    snprintf(s->level, sizeof s->level, "standard");
+    s->target_volume = p->scene->target_report.volume;
+    s->spacing = p->scene->structure.spacing;
+    snprintf(s->blas, sizeof s->blas, "%s", morph_blas_name());
+    snprintf(r->program, sizeof r->program, "morphplan %s", MORPH_VERSION);
+    memcpy(r->scene_sha256, p->scene->sha256, sizeof r->scene_sha256);
+}
+
+static morph_status run_stages(planner *p) {
+    static morph_status (*const stages[])(planner *) = {stage_target, stage_nominal, stage_refine, stage_path,
+                                                        stage_timing, stage_measure, stage_check};
+    morph_status status = MORPH_OK;
+    for (size_t k = 0; k < sizeof stages / sizeof *stages && status == MORPH_OK; k++) {
+        status = stages[k](p);
+        if (status == MORPH_OK && morph_stopped(p->options->control)) p->stopped = true;
+    }
+    return status;
+}
+
+morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *options, morph_plan **out) {
+    *out = NULL;
+    const double since = morph_seconds();
+    /* One BLAS thread: sums then repeat bit for bit. */
+    morph_blas_threads(1);
+    planner p = {.scene = scene, .options = options, .optimal = true};
+    if (options->control) p.quiet = *options->control;
+    p.quiet.stop = NULL;
+    p.plan = calloc(1, sizeof *p.plan);
+    if (!p.plan) return MORPH_ERR_NOMEM;
+    describe(&p);
+    const morph_status status = run_stages(&p);
+    morph_timing_free(&p.timing);
+    morph_curve_destroy(p.curve);
+    morph_trajectory_free(&p.nominal);
+    morph_workspace_free(&p.work);
+    free(p.end);
+    struct rusage usage;
+    if (getrusage(RUSAGE_SELF, &usage) == 0) p.plan->summary.peak_memory_bytes = usage.ru_maxrss * 1024L;
+    p.plan->summary.total_seconds = morph_seconds() - since;
+    if (status != MORPH_OK) {
+        morph_plan_destroy(p.plan);
+        return status;
+    }
+    *out = p.plan;
+    return MORPH_OK;
+}
+
+void morph_plan_destroy(morph_plan *plan) {
+    if (!plan) return;
+    morph_record_free(&plan->record);
+    free(plan);
+}

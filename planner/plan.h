@@ -1,0 +1,52 @@
+/* The main job: every stage from a scene to a checked record and its summary. Each stage reads what stands
+ * before it and writes only its own. */
+#ifndef MORPH_PLAN_H
+#define MORPH_PLAN_H
+
+#include "planner/path.h"
+#include "planner/refine.h"
+#include "planner/scene.h"
+#include "planner/summary.h"
+#include "planner/timing.h"
+
+typedef enum morph_method { MORPH_METHOD_IPOPT, MORPH_METHOD_BLANKET } morph_method;
+
+typedef struct morph_plan_options {
+    morph_method method;
+    const morph_control *control;
+} morph_plan_options;
+
+typedef struct morph_plan {
+    morph_record record;
+    morph_summary summary;
+} morph_plan;
+
+/* MORPH_OK whenever there is a record to write: summary.outcome says what it is worth ("stopped" after the
+ * control's stop). */
+morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *options, morph_plan **out);
+void morph_plan_destroy(morph_plan *plan);
+
+/* What the stages after the scene share; used by the benchmarks too. */
+typedef struct morph_workspace {
+    morph_structure *structure;
+    morph_distance *exact;
+    morph_sdf *sdf;
+    morph_cavity *cavity;
+    morph_world world;
+    double *start; /* 3*joints: flat, at the drop height above the target */
+    morph_sdf_accuracy accuracy;
+} morph_workspace;
+morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,
+                                    morph_workspace *out);
+void morph_workspace_free(morph_workspace *w);
+morph_blanket_def morph_scene_blanket(const morph_scene *scene);
+
+/* Copies the structure and target into the record, and a curve with its timing as samples. */
+morph_status morph_record_structure(morph_record *r, const morph_structure *s, const morph_mesh *target,
+                                    double base);
+morph_status morph_record_nominal(morph_record *r, const morph_structure *s, const morph_trajectory *t);
+morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, const morph_timing *timing,
+                                   double sample);
+morph_status morph_record_mobility(morph_record *r, const morph_structure *s);
+
+#endif

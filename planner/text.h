@@ -1,0 +1,17 @@
+/* What the program prints of its results, as text. NULL where memory is refused; free with free(). */
+#ifndef MORPH_TEXT_H
+#define MORPH_TEXT_H
+
+#include "model/kinematics.h"
+#include "planner/scene.h"
+#include "planner/summary.h"
+
+/* Six lines: outcome; cavity and gap, blanket -> plan; worst margin; duration; free motions; folder. */
+char *morph_plan_text(const morph_summary *summary, const char *folder);
+/* One line per margin and a verdict. */
+char *morph_check_text(const morph_check_report *report);
+/* Structure with link numbers, mobility, target. */
+char *morph_info_text(const morph_scene *scene, const morph_structure *structure,
+                      const morph_mobility *mobility);
+
+#endif

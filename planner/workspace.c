@@ -1,0 +1,75 @@
+#include "planner/plan.h"
+
+#include <stdlib.h>
+
+/* Box of everything the distance field must know: the flat structure with room to swing, the target, the base
+ * plane. */
+static void field_box(const morph_scene *scene, const morph_structure *s, const double *start, double lo[3],
+                      double hi[3]) {
+    const morph_mesh_report *t = &scene->target_report;
+    const double a = s->spacing;
+    for (int k = 0; k < 3; k++) {
+        lo[k] = hi[k] = start[k];
+        for (int j = 0; j < s->joints; j++) {
+            lo[k] = fmin(lo[k], start[3 * j + k]);
+            hi[k] = fmax(hi[k], start[3 * j + k]);
+        }
+        lo[k] = fmin(lo[k], t->lo[k]) - a;
+        hi[k] = fmax(hi[k], t->hi[k]) + a;
+    }
+    if (!isnan(scene->base)) lo[2] = fmax(lo[2], scene->base - 0.5 * a);
+}
+
+morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,
+                                    morph_workspace *w) {
+    *w = (morph_workspace){0};
+    morph_status status = morph_structure_create(&scene->structure, &w->structure);
+    if (status == MORPH_OK)
+        status = morph_distance_create(&scene->target, scene->target_report.closed, &w->exact);
+    const morph_structure *s = w->structure;
+    if (status == MORPH_OK && !(w->start = morph_alloc(3 * (size_t)s->joints, sizeof(double))))
+        status = MORPH_ERR_NOMEM;
+    if (status == MORPH_OK) {
+        double lo[3], hi[3];
+        /* The structure never starts in the base plane: with a target below it the plane counts as the top.
+         */
+        const double base = isnan(scene->base) ? -INFINITY : scene->base;
+        const double height = fmax(scene->target_report.hi[2], base) + scene->motion.height;
+        for (int i = 0; i < 3 * s->joints; i++)
+            w->start[i] = s->start[i] + (i % 3 == 2 ? height : 0.0);
+        field_box(scene, s, w->start, lo, hi);
+        /* A sixteenth of the spacing is about the links' radius; beyond 2.5 million nodes memory and time
+         * outgrow the gain: the rows' bias makes up for what a coarser field misses. */
+        const double volume = (hi[0] - lo[0]) * (hi[1] - lo[1]) * (hi[2] - lo[2]);
+        const double cell = fmax(s->spacing / 16.0, cbrt(volume / 2.5e6));
+        status = morph_sdf_create(w->exact, lo, hi, cell, control, &w->sdf);
+    }
+    if (status == MORPH_OK) {
+        morph_sdf_measure(w->sdf, w->exact, s->spacing, &w->accuracy);
+        status = morph_cavity_create(s, w->exact, scene->base, &w->cavity);
+    }
+    if (status != MORPH_OK) {
+        morph_workspace_free(w);
+        return status;
+    }
+    w->world = (morph_world){s, w->exact, w->sdf, w->cavity, scene->base};
+    return MORPH_OK;
+}
+
+void morph_workspace_free(morph_workspace *w) {
+    morph_cavity_destroy(w->cavity);
+    morph_sdf_destroy(w->sdf);
+    morph_distance_destroy(w->exact);
+    morph_structure_destroy(w->structure);
+    free(w->start);
+    *w = (morph_workspace){0};
+}
+
+morph_blanket_def morph_scene_blanket(const morph_scene *scene) {
+    return (morph_blanket_def){.gravity = scene->motion.gravity,
+                               .drag = scene->motion.drag,
+                               .friction = scene->motion.friction,
+                               .time = scene->motion.time,
+                               .frame = 0.01,
+                               .base = scene->base};
+}
