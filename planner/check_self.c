@@ -198,6 +198,7 @@ static morph_status search(bars *s, const morph_control *control, double h, morp
                      false,
                      false};
     start_values(s, &w, m);
+    if (!m->tested) return MORPH_OK;
     const double last = r->samples - 1;
     const int stretches = r->samples - 1 < STRETCHES ? r->samples - 1 : STRETCHES;
     for (int i = 0; i < stretches; i++) {

@@ -91,7 +91,8 @@ static inline void fixture_schedule(morph_record *r, const double *start, const 
         for (size_t l = 0; l < M; l++) {
             double e[3], d[3];
             for (int c = 0; c < 3; c++) {
-                const size_t a = 3 * (size_t)r->link[l][0] + (size_t)c, b = 3 * (size_t)r->link[l][1] + (size_t)c;
+                const size_t a = 3 * (size_t)r->link[l][0] + (size_t)c,
+                             b = 3 * (size_t)r->link[l][1] + (size_t)c;
                 d[c] = move[b] - move[a];
                 e[c] = start[b] - start[a] + s * d[c];
             }
@@ -143,8 +144,8 @@ static inline morph_check_report fixture_check(const morph_record *r) {
 }
 
 /* Exactly this margin fails, by this amount to within `error`, at this element and between these times. */
-static inline void fixture_expect(const morph_check_report *c, morph_margin_kind kind, double worst, double error,
-                                  const char *element, double from, double to) {
+static inline void fixture_expect(const morph_check_report *c, morph_margin_kind kind, double worst,
+                                  double error, const char *element, double from, double to) {
     assert_string_equal(c->defect, "");
     for (int k = 0; k < MORPH_MARGIN_KINDS; k++) {
         const morph_margin *m = &c->margin[k];
