@@ -43,6 +43,7 @@ typedef struct morph_motion_def {
     double height, gravity, drag, friction, time;
 } morph_motion_def;
 
+/* auto: centres are placed by a later version, so both plan alike for now; a list of centres is refused. */
 typedef enum morph_attractors { MORPH_ATTRACT_AUTO, MORPH_ATTRACT_NONE } morph_attractors;
 
 typedef struct morph_scene {
@@ -63,15 +64,22 @@ typedef struct morph_scene {
 /* Where faults go: one line each, "FILE:LINE: key: what is wrong, what is allowed". */
 typedef void (*morph_fault_sink)(void *user, const char *line);
 
-/* Reads and validates; *out is NULL unless MORPH_OK. All faults of the file are reported before
- * MORPH_ERR_INPUT is returned. Warnings (an open mesh) go to `warn`. The target is imported and transformed
- * too. */
+/* Reads and validates; *out is NULL unless MORPH_OK. All faults of the file, also those of the target's mesh,
+ * are reported in the order of their lines before MORPH_ERR_INPUT is returned; a file that cannot be read is
+ * a fault in line 1. What is understood but comes with a later version is the fault "FILE:LINE: KEY: not
+ * available yet: KEY: VALUE". Warnings (an open mesh, a target beside the grid) go to `warn`, before the
+ * faults. Either sink may be NULL. The target is imported, transformed and placed; target_def.at holds where,
+ * also if the scene does not say. Angles are radians whose written degrees read back to the same bits. Other
+ * errors: MORPH_ERR_NOMEM, MORPH_ERR_BACKEND and MORPH_ERR_INTERNAL from the mesh library's side, without a
+ * line. The caller's locale does not matter and is not changed. */
 morph_status morph_scene_read(const char *path, morph_fault_sink fault, morph_fault_sink warn, void *user,
                               morph_scene **out);
-void morph_scene_destroy(morph_scene *scene);
+void morph_scene_destroy(morph_scene *scene); /* NULL allowed */
 
 /* The scene with every default written out, as YAML text (free with free()). mesh_file: what to write as
- * target.file (the copy beside it), NULL for shapes without one. Reading it again gives the same plan. */
+ * target.file (the copy beside it, relative to where the text will stand), NULL for shapes without one or to
+ * keep the scene's own words. Reading it again gives the same scene to the bit, but for file names and
+ * sha256. MORPH_ERR_INPUT if mesh_file is not UTF-8, MORPH_ERR_NOMEM. */
 morph_status morph_scene_to_yaml(const morph_scene *scene, const char *mesh_file, char **text);
 
 #endif

@@ -4,7 +4,6 @@
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 static const morph_range force_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "N"};
 static const morph_range moment_range = {0.0, 3600.0, false, "s"};
@@ -106,8 +105,11 @@ static void read_start(const morph_value *root) {
     const morph_value start = morph_value_get(root, "start");
     char *text = NULL;
     if (morph_value_text(&start, 4000, &text) != MORPH_FOUND) return;
-    if (strcmp(text, "flat") != 0) morph_value_later(&start, text);
     free(text);
+    if (morph_value_is(&start, "flat")) return;
+    char is[80];
+    morph_value_describe(&start, is, sizeof is);
+    morph_value_later(&start, is);
 }
 
 static void read_goal(morph_scene_reader *r, const morph_value *root) {

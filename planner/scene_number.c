@@ -77,10 +77,14 @@ double morph_radians(double degrees) {
     return degrees * PI / 180.0;
 }
 
+double morph_degrees(double radians) {
+    return radians * 180.0 / PI;
+}
+
 double morph_degrees_print(double radians, char *text) {
     /* Degrees to radians rounds twice, so the inverse is off by a few units in the last place at most: the
      * double meant is among the neighbours of the computed one, nearest first. */
-    const double middle = radians * 180.0 / PI;
+    const double middle = morph_degrees(radians);
     for (int digits = integer_digits(middle); digits <= 17; digits++) {
         snprintf(text, MORPH_NUMBER_TEXT, "%.*g", digits, middle);
         const double degrees = strtod(text, NULL);

@@ -42,9 +42,6 @@ void morph_scene_read_extras(morph_scene_reader *r, const morph_value *root);
  * fault; other failures are handed on. */
 morph_status morph_scene_build_target(morph_scene_reader *r, const morph_value *root);
 
-/* Angles as their written form reads back, so that a written scene repeats to the bit. */
-void morph_scene_settle_angles(morph_scene *scene);
-
 /* The whole reading but for the file: bytes[size] are the file's. As morph_scene_read. */
 morph_status morph_scene_parse(const char *path, const char *bytes, size_t size, morph_fault_sink fault,
                                morph_fault_sink warn, void *user, morph_scene **out);

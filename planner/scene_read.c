@@ -145,7 +145,6 @@ static morph_status parse(morph_scene_reader *r, const char *path, const char *b
 
     const morph_value root = morph_yaml_root(&r->yaml);
     read_all(r, &root);
-    morph_scene_settle_angles(scene);
     if (r->target_known && !r->yaml.faults.nomem) status = morph_scene_build_target(r, &root);
     return status;
 }

@@ -44,6 +44,23 @@ static void require(const morph_value *value, const char *allowed) {
     if (!value->node) morph_value_fault(value, "is missing, allowed: %s", allowed);
 }
 
+/* Default angles as their degrees read back: radians that were multiplied out another way may be off in the
+ * last bit, or be reached by no degrees at all, and a written scene would not repeat. 15 digits round such an
+ * error away and are more than any default has. */
+static void settle_angles(double radians[2]) {
+    for (int k = 0; k < 2; k++) {
+        char text[MORPH_NUMBER_TEXT];
+        snprintf(text, sizeof text, "%.15g", morph_degrees(radians[k]));
+        radians[k] = morph_radians(strtod(text, NULL));
+    }
+}
+
+static void set_defaults(morph_structure_def *def, double spacing) {
+    *def = morph_structure_defaults(spacing);
+    settle_angles(def->link_post);
+    settle_angles(def->link_link);
+}
+
 /* nodes and spacing, which have no default. */
 static void read_grid(morph_scene_reader *r, const morph_value *map) {
     const long least[2] = {NODES_LEAST, NODES_LEAST}, most[2] = {NODES_MOST, NODES_MOST};
@@ -56,7 +73,7 @@ static void read_grid(morph_scene_reader *r, const morph_value *map) {
     require(&spacing, "a number of at least 1e-06 and at most 1e+06 m");
     r->spacing_known = morph_value_number(&spacing, &spacing_range, &distance) == MORPH_FOUND;
 
-    r->scene->structure = morph_structure_defaults(distance);
+    set_defaults(&r->scene->structure, distance);
     r->scene->structure.nodes[0] = (int)n[0];
     r->scene->structure.nodes[1] = (int)n[1];
 }
@@ -202,7 +219,7 @@ void morph_scene_read_structure(morph_scene_reader *r, const morph_value *root) 
     const morph_value map = morph_scene_section(root, "structure");
     const morph_value whole = morph_value_get(root, "structure");
     if (whole.node && !map.node && !morph_value_is_empty(&whole)) {
-        r->scene->structure = morph_structure_defaults(1.0); /* said already: not its keys one by one */
+        set_defaults(&r->scene->structure, 1.0); /* said already: not its keys one by one */
         return;
     }
     morph_structure_def *def = &r->scene->structure;

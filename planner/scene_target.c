@@ -63,11 +63,11 @@ static void check_own_keys(const morph_value *target, morph_shape shape) {
             char others[128];
             morph_join_names(names, shapes_of(own_keys[k].shapes, names), others, sizeof others);
             morph_fault_add(target->yaml, value.line, value.path,
-                            "a %s has no such key, only a %s has, allowed for a %s: %s",
-                            morph_shape_names[shape], others, morph_shape_names[shape], allowed);
+                            "is a key of %s, not of this shape, allowed for %s: %s", others,
+                            morph_shape_names[shape], allowed);
         }
         if (!value.node && belongs && strcmp(own_keys[k].name, "cell") != 0)
-            morph_value_fault(&value, "is missing, allowed for a %s: %s", morph_shape_names[shape], allowed);
+            morph_value_fault(&value, "is missing, allowed for %s: %s", morph_shape_names[shape], allowed);
     }
 }
 

@@ -208,16 +208,3 @@ morph_status morph_scene_to_yaml(const morph_scene *scene, const char *mesh_file
     *text = b.text;
     return MORPH_OK;
 }
-
-static void settle(double *radians, int n) {
-    for (int k = 0; k < n; k++) {
-        char text[MORPH_NUMBER_TEXT];
-        radians[k] = morph_radians(morph_degrees_print(radians[k], text));
-    }
-}
-
-void morph_scene_settle_angles(morph_scene *scene) {
-    settle(scene->structure.link_post, 2);
-    settle(scene->structure.link_link, 2);
-    settle(scene->target_def.rotate, 3);
-}

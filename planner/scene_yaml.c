@@ -65,7 +65,8 @@ static bool check_bytes(morph_yaml *yaml, const char *bytes, size_t size) {
 /* libyaml's own complaint in one line. MORPH_ERR_NOMEM if it ran out of memory. */
 static morph_status parser_fault(morph_yaml *yaml, const yaml_parser_t *parser, const char *bytes,
                                  size_t size) {
-    if (parser->error == YAML_MEMORY_ERROR) return MORPH_ERR_NOMEM;
+    /* The loader (0.2.5) may also fail without an error set: only where it could not allocate. */
+    if (parser->error == YAML_MEMORY_ERROR || parser->error == YAML_NO_ERROR) return MORPH_ERR_NOMEM;
     const char *problem = parser->problem ? parser->problem : "cannot be read";
     if (parser->error == YAML_READER_ERROR) {
         const size_t at = parser->problem_offset < size ? parser->problem_offset : size;
@@ -101,19 +102,30 @@ static const char *event_anchor(const yaml_event_t *event) {
     return (const char *)anchor;
 }
 
+typedef struct event_counts {
+    int depth, documents, nodes;
+} event_counts;
+
 /* What the document interface would hide or pay for: anchors, aliases, tags, further documents, depth. False
  * if the rest need not be looked at. */
-static bool check_event(morph_yaml *yaml, const yaml_event_t *event, int *depth, int *documents) {
+static bool check_event(morph_yaml *yaml, const yaml_event_t *event, event_counts *seen) {
     const int line = (int)event->start_mark.line + 1;
-    if (event->type == YAML_DOCUMENT_START_EVENT && ++*documents > 1) {
+    const bool opens = event->type == YAML_SEQUENCE_START_EVENT || event->type == YAML_MAPPING_START_EVENT;
+    const bool closes = event->type == YAML_SEQUENCE_END_EVENT || event->type == YAML_MAPPING_END_EVENT;
+    seen->depth += opens ? 1 : closes ? -1 : 0;
+    seen->nodes += opens || event->type == YAML_SCALAR_EVENT ? 1 : 0;
+    if (event->type == YAML_DOCUMENT_START_EVENT && ++seen->documents > 1) {
         morph_fault_add(yaml, line, "scene", "a second document begins here, allowed: one");
         return false;
     }
-    if (event->type == YAML_SEQUENCE_START_EVENT || event->type == YAML_MAPPING_START_EVENT) ++*depth;
-    if (event->type == YAML_SEQUENCE_END_EVENT || event->type == YAML_MAPPING_END_EVENT) --*depth;
-    if (*depth > MORPH_YAML_DEPTH) {
+    if (seen->depth > MORPH_YAML_DEPTH) {
         morph_fault_add(yaml, line, "scene", "nested deeper than %d, allowed: the keys of a scene",
                         MORPH_YAML_DEPTH);
+        return false;
+    }
+    if (seen->nodes > MORPH_YAML_NODES) {
+        morph_fault_add(yaml, line, "scene", "more than %d values, allowed: the keys of a scene",
+                        MORPH_YAML_NODES);
         return false;
     }
     const char *anchor = event_anchor(event);
@@ -139,17 +151,17 @@ static morph_status check_events(morph_yaml *yaml, const char *bytes, size_t siz
     set_input(&parser, bytes, size);
 
     morph_status status = MORPH_OK;
-    int depth = 0, documents = 0;
+    event_counts seen = {0};
     for (bool more = true; more;) {
         yaml_event_t event;
         if (!yaml_parser_parse(&parser, &event)) {
             status = parser_fault(yaml, &parser, bytes, size);
             break;
         }
-        more = event.type != YAML_STREAM_END_EVENT && check_event(yaml, &event, &depth, &documents);
+        more = event.type != YAML_STREAM_END_EVENT && check_event(yaml, &event, &seen);
         yaml_event_delete(&event);
     }
-    if (status == MORPH_OK && documents == 0)
+    if (status == MORPH_OK && seen.documents == 0)
         morph_fault_add(yaml, 1, "scene", "the file is empty, allowed: a scene");
     yaml_parser_delete(&parser);
     return status;

@@ -11,9 +11,16 @@
 
 #include <yaml.h>
 
-/* A file larger or nested deeper than this is no scene. The scene itself nests 4 deep and holds about 60
- * keys; the limits bound what hostile input can cost. */
-enum { MORPH_YAML_BYTES = 1 << 20, MORPH_YAML_DEPTH = 16, MORPH_YAML_KEYS = 256, MORPH_YAML_FAULTS = 1000 };
+/* A file larger, nested deeper or with more values than this is no scene: a scene nests 4 deep and holds
+ * about 60 keys, and 64 x 64 nodes listed one by one are 12288 values. The limits bound what hostile input
+ * can cost. */
+enum {
+    MORPH_YAML_BYTES = 1 << 20,
+    MORPH_YAML_DEPTH = 16,
+    MORPH_YAML_NODES = 50000,
+    MORPH_YAML_KEYS = 256,
+    MORPH_YAML_FAULTS = 1000
+};
 
 typedef struct morph_fault {
     int line, order;
@@ -127,6 +134,7 @@ morph_number_kind morph_number_parse(const char *text, double *out);
 enum { MORPH_NUMBER_TEXT = 32 };
 void morph_number_print(double x, char *text);
 double morph_radians(double degrees);
+double morph_degrees(double radians);
 /* The shortest decimal of degrees that morph_radians turns into the same radians; the closest one if there is
  * none (radians that did not come from degrees). Returns the degrees that text says. */
 double morph_degrees_print(double radians, char *text);

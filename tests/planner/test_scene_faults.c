@@ -172,7 +172,7 @@ static const bad_case cases[] = {
     {7, "    rate: 0", 7, "structure.link.rate", "too small"},
     {7, "    acceleration: fast", 7, "structure.link.acceleration", "fast is no number"},
     {7, "    jerk: -2", 7, "structure.link.jerk",
-     "-2 is negative, allowed: a number above 0 and at most 1000000000 m/s3"},
+     "-2 is negative, allowed: a number above 0 and at most 1e+09 m/s3"},
     {7, "    stiffness: 1e10", 7, "structure.link.stiffness", "1e10 is too large"},
     {7, "    damping: -0.5", 7, "structure.link.damping",
      "-0.5 is negative, allowed: a number of at least 0"},
@@ -210,7 +210,7 @@ static const bad_case cases[] = {
     {11, "  shape: cube", 11, "target.shape", "cube is not known, allowed: box, sphere"},
     {11, "  shape: shpere", 11, "target.shape", "did you mean sphere?"},
     {11, "  scale: 1", 10, "target.shape", "is missing, allowed: box, sphere"},
-    {12, "  scale: 1", 10, "target.size", "is missing, allowed for a box: size"},
+    {12, "  scale: 1", 10, "target.size", "is missing, allowed for box: size"},
     {12, "  size: [0.1, 0.1]", 12, "target.size", "a list of 2, allowed: a list of 3"},
     {12, "  size: 0.1", 12, "target.size", "allowed: a list of 3, each a number above 0"},
     {12, "  size: [0.1, -0.1, 0.1]", 12, "target.size[1]", "-0.1 is negative"},
@@ -218,12 +218,9 @@ static const bad_case cases[] = {
     {12, "  size:\n    - 0.1\n    - nan\n    - 0.1", 14, "target.size[1]", "nan is not finite"},
     {12, "  size: [150, 150, 100]", 11, "target.shape", "the shape is 150 m large, allowed: at most 20 m"},
     {12, "  size: [1, 1, 1]\n  radius: 2", 13, "target.radius",
-     "a box has no such key, only a sphere, cylinder"},
+     "is a key of sphere, cylinder, cone, torus, capsule, not of this shape, allowed for box: size"},
     {12, "  size: [1, 1, 1]\n  file: a.obj", 13, "target.file",
-     "only a mesh, heightmap has, allowed for a box: size"},
-    {11, "  shape: torus\n  radius: 0.1\n  tube: 0.1\n  #", 13, "target.tube", "0.1 closes the hole"},
-    {11, "  shape: capsule\n  radius: 0.1\n  height: 0.2\n  #", 13, "target.height",
-     "more than twice the radius"},
+     "is a key of mesh, heightmap, not of this shape"},
     {12, "  size: [1, 1, 1]\n  scale: 0", 13, "target.scale", "0 is too small"},
     {12, "  size: [1, 1, 1]\n  scale: 1\n  fit: [1, 1, 1]", 14, "target.fit",
      "stands beside scale (line 13)"},
@@ -378,6 +375,17 @@ static void test_all_at_once(void **state) {
                      MORPH_ERR_INPUT);
 }
 
+static char *repeated(const char *piece, size_t bytes, size_t *size) {
+    const size_t n = strlen(piece), times = bytes / n;
+    char *text = malloc(n * times + 1);
+    assert_non_null(text);
+    for (size_t k = 0; k < times; k++)
+        memcpy(text + k * n, piece, n);
+    text[n * times] = '\0';
+    *size = n * times;
+    return text;
+}
+
 /* Sections that are no mapping or empty; required ones missing altogether. */
 static void test_sections(void **state) {
     (void)state;
@@ -414,6 +422,40 @@ static void test_sections(void **state) {
     expect(1, "structure.spacing", "is missing");
     expect(1, "target", "is missing");
     assert_int_equal(faults.count, 4);
+}
+
+/* Relations between a shape's own sizes, and each shape's required keys. */
+static void test_shapes(void **state) {
+    (void)state;
+    static const struct {
+        const char *target, *key, *phrase;
+    } bad[] = {
+        {"shape: torus, radius: 0.1, tube: 0.1", "target.tube",
+         "0.1 closes the hole, allowed: less than the radius"},
+        {"shape: torus, radius: 0.1", "target.tube", "is missing, allowed for torus: radius, tube"},
+        {"shape: capsule, radius: 0.1, height: 0.2", "target.height", "more than twice the radius (0.2)"},
+        {"shape: capsule, height: 0.2", "target.radius", "is missing"},
+        {"shape: sphere", "target.radius", "is missing"},
+        {"shape: sphere, radius: 0.1, radii: [1, 1, 1]", "target.radii", "is a key of ellipsoid, not"},
+        {"shape: ellipsoid, radii: [0.1, 0.1]", "target.radii", "a list of 2, allowed: a list of 3"},
+        {"shape: cylinder, radius: 0.1", "target.height", "is missing"},
+        {"shape: cone, height: 0.1, radius: -0.1", "target.radius", "-0.1 is negative"},
+        {"shape: cone, height: 0.1, radius: 0.1, scale: 1000", "target.shape", "200 m large"},
+        {"shape: mesh", "target.file", "is missing, allowed for mesh: file"},
+        {"shape: mesh, file: []", "target.file", "a list of 0 is no text"},
+        {"shape: mesh, file: no_such.obj", "target.file", ""},
+        {"shape: mesh, file: a.obj, cell: 1", "target.cell", "is a key of heightmap, not"},
+        {"shape: heightmap, file: a.csv, cell: 0", "target.cell", "0 is too small"},
+        {"shape: heightmap, file: no_such.csv", "target.file", ""},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        char text[400];
+        snprintf(text, sizeof text, "morphplan: 1\nstructure: {nodes: [4, 4], spacing: 0.1}\ntarget: {%s}\n",
+                 bad[k].target);
+        parse_bad(text, strlen(text));
+        expect(3, bad[k].key, bad[k].phrase);
+        assert_int_equal(faults.count, 1);
+    }
 }
 
 /* What is no scene at all. */
@@ -456,6 +498,13 @@ static void test_syntax(void **state) {
         parse_bad(bad[k].text, strlen(bad[k].text));
         expect(bad[k].line, "scene", bad[k].phrase);
     }
+    /* Within a megabyte, but far more values than any scene has. */
+    size_t size;
+    char *many = repeated("- 1\n", 400000, &size);
+    parse_bad(many, size);
+    expect(MORPH_YAML_NODES, "scene", "more than 50000 values");
+    assert_int_equal(faults.count, 1);
+    free(many);
     parse_bad("a: 1\0b", 6);
     expect(1, "scene", "control character 0x00");
     /* A byte order mark is fine. */
@@ -465,17 +514,6 @@ static void test_syntax(void **state) {
     morph_scene *scene;
     assert_int_equal(morph_scene_parse("s.yaml", marked, strlen(marked), NULL, NULL, NULL, &scene), MORPH_OK);
     morph_scene_destroy(scene);
-}
-
-static char *repeated(const char *piece, size_t bytes, size_t *size) {
-    const size_t n = strlen(piece), times = bytes / n;
-    char *text = malloc(n * times + 1);
-    assert_non_null(text);
-    for (size_t k = 0; k < times; k++)
-        memcpy(text + k * n, piece, n);
-    text[n * times] = '\0';
-    *size = n * times;
-    return text;
 }
 
 /* A megabyte of anything is answered quickly: each within a second. */
@@ -524,6 +562,10 @@ static void test_missing_files(void **state) {
     assert_null(scene);
     assert_int_equal(faults.count, 1);
     assert_non_null(strstr(faults.text[0], "/no/such/scene.yaml:1: scene: cannot be read: No such file"));
+    /* One line, whatever the name. */
+    faults.count = 0;
+    assert_int_equal(morph_scene_read("no\nsuch\tscene", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
+    assert_int_equal(strncmp(faults.text[0], "no?such?scene:1: scene: cannot be read", 38), 0);
     faults.count = 0;
     assert_int_equal(morph_scene_read("/tmp", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
     assert_int_equal(faults.count, 1);
@@ -553,11 +595,11 @@ static void test_warning(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_control),     cmocka_unit_test(test_cases),
-        cmocka_unit_test(test_sections),    cmocka_unit_test(test_all_at_once),
-        cmocka_unit_test(test_syntax),      cmocka_unit_test(test_hostile),
-        cmocka_unit_test(test_many_faults), cmocka_unit_test(test_missing_files),
-        cmocka_unit_test(test_warning),
+        cmocka_unit_test(test_control),       cmocka_unit_test(test_cases),
+        cmocka_unit_test(test_sections),      cmocka_unit_test(test_shapes),
+        cmocka_unit_test(test_all_at_once),   cmocka_unit_test(test_syntax),
+        cmocka_unit_test(test_hostile),       cmocka_unit_test(test_many_faults),
+        cmocka_unit_test(test_missing_files), cmocka_unit_test(test_warning),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
