@@ -1,0 +1,326 @@
+/* Still pictures: what goes where, and onto which surface. */
+#include "planner/picture.h"
+
+#include "planner/folder_text.h"
+#include "planner/picture_parts.h"
+
+#include <cairo-svg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+enum { PAGE_WIDTH = 1400, PAGE_HEIGHT = 1410 };
+
+morph_motion morph_motion_schedule(const morph_record *r) {
+    return (morph_motion){r->samples, r->time, r->schedule_joints, r->length, r->offset_schedule};
+}
+
+morph_motion morph_motion_nominal(const morph_record *r) {
+    return (morph_motion){r->nominal_frames, r->nominal_time, r->nominal_joints, r->nominal_lengths,
+                          r->offset_nominal};
+}
+
+static bool all_finite(const double *v, size_t n) {
+    for (size_t i = 0; v && i < n; i++)
+        if (!isfinite(v[i])) return false;
+    return true;
+}
+
+static bool motion_finite(const morph_record *r, const morph_motion *m) {
+    size_t n = (size_t)m->frames;
+    return all_finite(m->time, n) && all_finite(m->joints, 3 * n * (size_t)r->joints) &&
+           all_finite(m->lengths, n * (size_t)r->links) && all_finite(m->offset, 3 * n);
+}
+
+/* Everything that is turned into a place on paper. */
+static bool drawable(const morph_record *r) {
+    morph_motion schedule = morph_motion_schedule(r), nominal = morph_motion_nominal(r);
+    return motion_finite(r, &schedule) && motion_finite(r, &nominal) &&
+           all_finite(r->target_v, 3 * (size_t)r->target_vertices) &&
+           all_finite(&r->length_limit[0][0], 2 * (size_t)r->links) &&
+           all_finite(r->link_radius, (size_t)r->links) && isfinite(r->spacing) && r->spacing > 0;
+}
+
+/* Start, a third, two thirds, end. */
+static int moment(const morph_motion *m, int k) {
+    return (int)((long long)(m->frames - 1) * k / 3);
+}
+
+static const double *joints_at(const morph_record *r, const morph_motion *m, int frame) {
+    return m->joints + 3 * (size_t)frame * (size_t)r->joints;
+}
+
+static const double *offset_at(const morph_motion *m, int frame) {
+    return m->offset ? m->offset + 3 * (size_t)frame : NULL;
+}
+
+/* From the front left, raised: the sheet's upper side and the target beneath are both seen. */
+static morph_view oblique(void) {
+    return morph_view_from(-62 * M_PI / 180, 27 * M_PI / 180);
+}
+
+/* Nearly level: gaps show. */
+static morph_view level(void) {
+    return morph_view_from(-90 * M_PI / 180, 7 * M_PI / 180);
+}
+
+/* The ground under a pose belongs to the picture too. */
+static void add_ground(const morph_record *r, const double *joints, const morph_view *view,
+                       morph_bounds *bounds) {
+    double lo[2], hi[2];
+    if (!morph_ground(r, joints, lo, hi)) return;
+    const double corner[12] = {lo[0], lo[1], r->base, hi[0], lo[1], r->base,
+                               lo[0], hi[1], r->base, hi[0], hi[1], r->base};
+    morph_bounds_add(bounds, view, corner, 4, NULL);
+}
+
+/* The same scale for all four moments. */
+static void fit_moments(const morph_record *r, const morph_motion *m, const morph_box *box,
+                        morph_view *view) {
+    morph_bounds bounds = morph_bounds_empty();
+    for (int k = 0; k < 4; k++) {
+        int frame = moment(m, k);
+        morph_bounds_add(&bounds, view, joints_at(r, m, frame), r->joints, NULL);
+        morph_bounds_add(&bounds, view, r->target_v, r->target_vertices, offset_at(m, frame));
+        add_ground(r, joints_at(r, m, frame), view, &bounds);
+    }
+    morph_view_fit(view, &bounds, box);
+}
+
+static void caption(cairo_t *c, const morph_motion *m, int k, const morph_box *box) {
+    static const char *const names[] = {"start", "one third", "two thirds", "end"};
+    char text[64];
+    snprintf(text, sizeof text, "t = %.2f s", m->time[moment(m, k)]);
+    morph_put_text(c, text, box->x + 14, box->y + 26, 17, 0, true, morph_colour_text);
+    double after = morph_text_width(c, text, 17, true);
+    morph_put_text(c, names[k], box->x + 26 + after, box->y + 26, 15, 0, false, morph_colour_faint);
+}
+
+static void frame_box(cairo_t *c, const morph_box *box) {
+    cairo_set_line_width(c, 1);
+    cairo_set_source_rgb(c, 0.86, 0.88, 0.90);
+    cairo_rectangle(c, box->x + 0.5, box->y + 0.5, box->width - 1, box->height - 1);
+    cairo_stroke(c);
+}
+
+static morph_box inside(const morph_box *box) {
+    return (morph_box){box->x + 18, box->y + 30, box->width - 36, box->height - 44};
+}
+
+static morph_status draw_moment(cairo_t *c, const morph_record *r, const morph_motion *m, int k,
+                                const morph_box *box, const morph_view *view, const morph_relief *relief) {
+    int frame = moment(m, k);
+    frame_box(c, box);
+    cairo_save(c);
+    cairo_rectangle(c, box->x, box->y, box->width, box->height);
+    cairo_clip(c);
+    morph_status status = morph_draw_pose(c, r, joints_at(r, m, frame), offset_at(m, frame), view, relief);
+    cairo_restore(c);
+    caption(c, m, k, box);
+    return status;
+}
+
+/* Key to the colours, ending at the right edge. */
+static void draw_key(cairo_t *c, double right, double y) {
+    static const char *const names[] = {"target", "post", "top layer", "bottom layer"};
+    const morph_colour colours[] = {morph_colour_target, morph_colour_post, morph_colour_top,
+                                    morph_colour_bottom};
+    for (int k = 0; k < 4; k++) {
+        double width = morph_text_width(c, names[k], 14, false);
+        morph_put_text(c, names[k], right, y, 14, 1, false, morph_colour_text);
+        right -= width + 9;
+        morph_set_colour(c, colours[k], 1);
+        if (k == 0) {
+            cairo_rectangle(c, right - 18, y - 11, 18, 13);
+            cairo_fill_preserve(c);
+            morph_set_colour(c, morph_colour_faint, 1);
+            cairo_set_line_width(c, 0.8);
+            cairo_stroke(c);
+        } else {
+            cairo_set_line_cap(c, CAIRO_LINE_CAP_ROUND);
+            cairo_set_line_width(c, k == 1 ? 2.5 : 5);
+            cairo_move_to(c, right - 20, y - 5);
+            cairo_line_to(c, right - 2, y - 5);
+            cairo_stroke(c);
+            cairo_set_line_cap(c, CAIRO_LINE_CAP_BUTT);
+        }
+        right -= 44;
+    }
+}
+
+/* A title longer than its room is cut at a whole UTF-8 sequence. */
+static void draw_title(cairo_t *c, const char *title, double x, double y, double room) {
+    char text[200];
+    snprintf(text, sizeof text - 4, "%s", title);
+    size_t n = strlen(text);
+    bool cut = strlen(title) > n;
+    while (n > 0 && (cut || morph_text_width(c, text, 24, true) > room)) {
+        cut = false;
+        do
+            n--;
+        while (n > 0 && ((unsigned char)title[n] & 0xC0) == 0x80);
+        memcpy(text + n, "\xE2\x80\xA6", 4); /* an ellipsis */
+    }
+    morph_put_text(c, text, x, y, 24, 0, true, morph_colour_text);
+}
+
+static morph_status draw_page(cairo_t *c, const morph_record *r, const char *title) {
+    morph_motion m = morph_motion_schedule(r);
+    if (m.frames == 0) m = morph_motion_nominal(r); /* the best of a run that never got to a schedule */
+    cairo_set_source_rgb(c, 1, 1, 1);
+    cairo_paint(c);
+    draw_key(c, PAGE_WIDTH - 36, 46);
+    draw_title(c, title ? title : "", 36, 48, PAGE_WIDTH - 580);
+    const morph_box first = {36, 70, 656, 452};
+    morph_box room = inside(&first);
+    morph_view base = oblique();
+    fit_moments(r, &m, &room, &base);
+    morph_relief relief;
+    morph_status status = morph_relief_create(r, &base, &relief);
+    for (int k = 0; k < 4 && status == MORPH_OK; k++) {
+        /* One view and one image of the target, carried to each box. */
+        double right = k % 2 * (first.width + 16), down = k / 2 * (first.height + 16);
+        cairo_save(c);
+        cairo_translate(c, right, down);
+        status = draw_moment(c, r, &m, k, &first, &base, &relief);
+        cairo_restore(c);
+    }
+    const morph_box left = {28, 1018, 664, 372}, right = {700, 1018, 672, 372};
+    if (status == MORPH_OK) status = morph_draw_length(c, r, &m, &left);
+    if (status == MORPH_OK) status = morph_draw_lengths(c, r, &m, &right);
+    morph_relief_free(&relief);
+    return status;
+}
+
+/* One panel of the page, for embedding. */
+static morph_status draw_panel(cairo_t *c, const morph_record *r, int panel, const morph_box *box) {
+    morph_motion m = morph_motion_schedule(r), nominal = morph_motion_nominal(r);
+    const morph_motion *which = panel == 6 || (panel < 6 && m.frames == 0) ? &nominal : &m;
+    if (which->frames == 0 || !which->joints || !which->lengths || !which->time) return MORPH_ERR_INPUT;
+    if (panel == 4) return morph_draw_length(c, r, which, box);
+    if (panel == 5) return morph_draw_lengths(c, r, which, box);
+    morph_relief relief;
+    morph_box room = inside(box);
+    morph_view view = panel < 4 ? oblique() : level();
+    if (panel < 4) {
+        fit_moments(r, which, &room, &view);
+    } else { /* both ends in one scale */
+        morph_bounds bounds = morph_bounds_empty();
+        const morph_motion *ends[] = {&nominal, &m};
+        for (int k = 0; k < 2; k++)
+            if (ends[k]->frames > 0)
+                morph_bounds_add(&bounds, &view, joints_at(r, ends[k], ends[k]->frames - 1), r->joints, NULL);
+        morph_bounds_add(&bounds, &view, r->target_v, r->target_vertices, NULL);
+        room = (morph_box){box->x + 10, box->y + 10, box->width - 20, box->height - 20};
+        morph_view_fit(&view, &bounds, &room);
+    }
+    morph_status status = morph_relief_create(r, &view, &relief);
+    if (status == MORPH_OK && panel < 4) {
+        status = draw_moment(c, r, which, panel, box, &view, &relief);
+    } else if (status == MORPH_OK) {
+        int end = which->frames - 1;
+        status = morph_draw_pose(c, r, joints_at(r, which, end), offset_at(which, end), &view, &relief);
+    }
+    morph_relief_free(&relief);
+    return status;
+}
+
+static cairo_status_t collect(void *closure, const unsigned char *data, unsigned int length) {
+    morph_text *text = closure;
+    morph_text_put(text, (const char *)data, length);
+    return text->failed ? CAIRO_STATUS_NO_MEMORY : CAIRO_STATUS_SUCCESS;
+}
+
+/* panel -1: the whole page. The surface is drawn, finished and destroyed. */
+static morph_status render(cairo_surface_t *surface, const morph_record *r, const char *title, int panel,
+                           const morph_box *box, bool png, morph_text *out) {
+    cairo_t *c = cairo_create(surface);
+    morph_status status = panel < 0 ? draw_page(c, r, title) : draw_panel(c, r, panel, box);
+    cairo_status_t drawn = cairo_status(c);
+    cairo_destroy(c);
+    if (status == MORPH_OK && drawn == CAIRO_STATUS_SUCCESS && png)
+        drawn = cairo_surface_write_to_png_stream(surface, collect, out);
+    cairo_surface_finish(surface);
+    if (drawn == CAIRO_STATUS_SUCCESS) drawn = cairo_surface_status(surface);
+    cairo_surface_destroy(surface);
+    if (status == MORPH_OK && (drawn == CAIRO_STATUS_NO_MEMORY || out->failed)) status = MORPH_ERR_NOMEM;
+    if (status == MORPH_OK && drawn != CAIRO_STATUS_SUCCESS) status = MORPH_ERR_BACKEND;
+    return status;
+}
+
+static bool ends_with(const char *file, const char *ending) {
+    size_t n = strlen(file), m = strlen(ending);
+    return n > m && strcasecmp(file + n - m, ending) == 0;
+}
+
+morph_status morph_picture_write(const morph_record *record, const char *title, const char *file,
+                                 char *message, size_t size) {
+    bool png = ends_with(file, ".png");
+    if (!png && !ends_with(file, ".svg"))
+        return morph_fail(MORPH_ERR_INPUT, message, size, "%s: the name must end in .svg or .png", file);
+    if (record->samples == 0 && record->nominal_frames == 0)
+        return morph_fail(MORPH_ERR_INPUT, message, size, "%s: the plan holds no motion to draw", file);
+    if (!drawable(record))
+        return morph_fail(MORPH_ERR_INPUT, message, size,
+                          "%s: the plan holds a number that is not finite and cannot be drawn", file);
+    morph_locale locale;
+    if (!morph_locale_enter(&locale))
+        return morph_fail(MORPH_ERR_NOMEM, message, size, "%s: out of memory", file);
+    morph_text text = {0};
+    cairo_surface_t *surface =
+        png ? cairo_image_surface_create(CAIRO_FORMAT_RGB24, PAGE_WIDTH, PAGE_HEIGHT)
+            : cairo_svg_surface_create_for_stream(collect, &text, PAGE_WIDTH, PAGE_HEIGHT);
+    morph_status status = render(surface, record, title, -1, NULL, png, &text);
+    morph_locale_leave(&locale);
+    if (status == MORPH_OK)
+        status = morph_file_replace(file, text.data, text.size, message, size);
+    else
+        morph_fail(status, message, size, "%s: cannot be drawn: %s", file, morph_status_text(status));
+    morph_text_free(&text);
+    return status;
+}
+
+/* Cairo numbers its symbols alike in every picture; on one page they must differ. Every id and every
+ * reference to one gets the panel in front; what stands before <svg is left out. */
+static void embed(const morph_text *svg, int panel, morph_text *out) {
+    static const char *const marks[] = {" id=\"", "href=\"#", "url(#"};
+    const char *from = strstr(svg->data, "<svg");
+    if (!from) return;
+    const char *at = from;
+    while (*at) {
+        size_t length = 0;
+        for (int k = 0; k < 3 && length == 0; k++)
+            if (strncmp(at, marks[k], strlen(marks[k])) == 0) length = strlen(marks[k]);
+        at += length > 0 ? length : 1;
+        if (length == 0) continue;
+        morph_text_put(out, from, (size_t)(at - from));
+        morph_text_add(out, "p%d-", panel);
+        from = at;
+    }
+    morph_text_put(out, from, (size_t)(at - from));
+}
+
+morph_status morph_picture_svg(const morph_record *record, int panel, double width, double height,
+                               char **text) {
+    *text = NULL;
+    /* Less has no room for axes; more is no panel of a page. */
+    if (panel < 0 || panel > 7 || !(width >= 200 && width <= 10000 && height >= 120 && height <= 10000) ||
+        !drawable(record))
+        return MORPH_ERR_INPUT;
+    morph_locale locale;
+    if (!morph_locale_enter(&locale)) return MORPH_ERR_NOMEM;
+    morph_text svg = {0}, out = {0};
+    const morph_box box = {0, 0, width, height};
+    cairo_surface_t *surface = cairo_svg_surface_create_for_stream(collect, &svg, width, height);
+    morph_status status = render(surface, record, NULL, panel, &box, false, &svg);
+    if (status == MORPH_OK && svg.data) embed(&svg, panel, &out);
+    if (status == MORPH_OK && (out.failed || !out.data)) status = MORPH_ERR_NOMEM;
+    morph_locale_leave(&locale);
+    morph_text_free(&svg);
+    if (status == MORPH_OK)
+        *text = out.data;
+    else
+        morph_text_free(&out);
+    return status;
+}

@@ -1,0 +1,189 @@
+/* summary.json: the numbers of one plan, by the names that other programs rely on. */
+#include "planner/summary.h"
+
+#include "planner/folder.h"
+#include "planner/folder_text.h"
+
+#include <cjson/cJSON.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *morph_stage_name(morph_stage stage) {
+    static const char *const names[MORPH_STAGES] = {"target", "nominal", "refine", "path",
+                                                    "timing", "measure", "check",  "write"};
+    int k = (int)stage;
+    return k >= 0 && k < MORPH_STAGES ? names[k] : "unknown";
+}
+
+/* cJSON's helpers add nothing and return NULL when memory is refused; a NULL parent is allowed. Every result
+ * goes through `keep`, so that one flag tells at the end. */
+typedef struct builder {
+    bool failed;
+} builder;
+
+static cJSON *keep(builder *b, cJSON *item) {
+    if (!item) b->failed = true;
+    return item;
+}
+
+/* The library's own number format depends on its version; ours reads back bit for bit, and what is not finite
+ * becomes null. */
+static void put_number(builder *b, cJSON *at, const char *key, double value) {
+    char text[32];
+    morph_number(value, text);
+    keep(b, cJSON_AddRawToObject(at, key, text));
+}
+
+/* The library writes bytes as they are: text that is no UTF-8 would make the file unreadable. */
+static void put_text(builder *b, cJSON *at, const char *key, const char *value) {
+    morph_text text = {0};
+    morph_text_json(&text, value);
+    if (text.failed)
+        b->failed = true;
+    else
+        keep(b, cJSON_AddRawToObject(at, key, text.data));
+    morph_text_free(&text);
+}
+
+static void put_bool(builder *b, cJSON *at, const char *key, bool value) {
+    keep(b, cJSON_AddBoolToObject(at, key, value));
+}
+
+static cJSON *put_object(builder *b, cJSON *at, const char *key) {
+    return keep(b, cJSON_AddObjectToObject(at, key));
+}
+
+/* {blanket, plan}; a method that gave no result is null. */
+static void put_pair(builder *b, cJSON *at, const char *key, const morph_summary *s, double blanket,
+                     double plan) {
+    cJSON *object = put_object(b, at, key);
+    put_number(b, object, "blanket", s->has_blanket ? blanket : (double)NAN);
+    put_number(b, object, "plan", s->has_plan ? plan : (double)NAN);
+}
+
+static void put_gap(builder *b, cJSON *at, const char *key, bool present, const morph_measure *m) {
+    if (!present) {
+        keep(b, cJSON_AddNullToObject(at, key));
+        return;
+    }
+    cJSON *gap = put_object(b, at, key);
+    put_number(b, gap, "mean", m->gap_mean);
+    put_number(b, gap, "p95", m->gap_p95);
+    put_number(b, gap, "max", m->gap_max);
+    put_number(b, gap, "target", m->gap_target);
+}
+
+static void put_measures(builder *b, cJSON *root, const morph_summary *s) {
+    put_pair(b, root, "cavity_volume", s, s->blanket.volume, s->plan.volume);
+    put_number(b, root, "target_volume", s->target_volume);
+    put_pair(b, root, "objective", s, s->blanket.objective, s->plan.objective);
+    cJSON *gap = put_object(b, root, "gap");
+    put_gap(b, gap, "blanket", s->has_blanket, &s->blanket);
+    put_gap(b, gap, "plan", s->has_plan, &s->plan);
+    put_pair(b, root, "coverage", s, s->blanket.coverage, s->plan.coverage);
+}
+
+static void put_margins(builder *b, cJSON *root, const morph_summary *s) {
+    cJSON *margins = put_object(b, root, "margins");
+    for (int k = 0; s->has_plan && k < MORPH_MARGIN_KINDS; k++) {
+        const morph_margin *m = &s->check.margin[k];
+        if (!m->tested) continue;
+        cJSON *margin = put_object(b, margins, morph_margin_name((morph_margin_kind)k));
+        put_number(b, margin, "worst", m->worst);
+        put_text(b, margin, "element", m->element);
+        put_number(b, margin, "time", m->time);
+        put_text(b, margin, "unit", morph_margin_unit((morph_margin_kind)k));
+        put_number(b, margin, "tolerance", m->tolerance);
+        put_bool(b, margin, "holds", m->worst >= -m->tolerance);
+    }
+}
+
+static void put_solver(builder *b, cJSON *root, const morph_summary *s) {
+    cJSON *iterations = put_object(b, root, "iterations");
+    put_number(b, iterations, "refine", s->iterations_refine);
+    put_number(b, iterations, "path", s->iterations_path);
+    put_number(b, iterations, "timing", s->iterations_timing);
+    cJSON *unknowns = put_object(b, root, "unknowns");
+    put_number(b, unknowns, "refine", s->unknowns_refine);
+    put_number(b, unknowns, "path", s->unknowns_path);
+    cJSON *rows = put_object(b, root, "rows"), *stage = put_object(b, rows, "refine");
+    put_number(b, stage, "used", s->rows_refine_used);
+    put_number(b, stage, "possible", s->rows_refine_possible);
+    stage = put_object(b, rows, "path");
+    put_number(b, stage, "used", s->rows_path_used);
+    put_number(b, stage, "possible", s->rows_path_possible);
+}
+
+/* Everything that differs from run to run stands here and in peak_memory_bytes. */
+static void put_seconds(builder *b, cJSON *root, const morph_summary *s) {
+    cJSON *seconds = put_object(b, root, "seconds");
+    for (int k = 0; k < MORPH_STAGES; k++)
+        put_number(b, seconds, morph_stage_name((morph_stage)k), s->seconds[k]);
+    put_number(b, seconds, "linear_solver", s->linear_seconds);
+    put_number(b, seconds, "callbacks", s->callback_seconds);
+    put_number(b, seconds, "blanket_run", s->blanket_report.seconds);
+    put_number(b, seconds, "total", s->total_seconds);
+    put_number(b, root, "peak_memory_bytes", (double)s->peak_memory_bytes);
+}
+
+static void put_details(builder *b, cJSON *root, const morph_summary *s) {
+    const morph_blanket_report *r = &s->blanket_report;
+    cJSON *run = put_object(b, root, "blanket_run");
+    put_number(b, run, "steps", r->steps);
+    put_number(b, run, "step", r->step);
+    put_number(b, run, "step_halvings", r->step_halvings);
+    put_bool(b, run, "at_rest", r->at_rest);
+    put_number(b, run, "rest_speed", r->rest_speed);
+    put_number(b, run, "worst_length", r->worst_length);
+    put_number(b, run, "worst_post", r->worst_post);
+    put_number(b, run, "worst_clearance", r->worst_clearance);
+    cJSON *distance = put_object(b, root, "distance_grid");
+    put_number(b, distance, "cell", s->sdf_cell);
+    put_number(b, distance, "rms", s->sdf_rms);
+    put_number(b, distance, "max", s->sdf_max);
+    put_text(b, root, "blas", s->blas);
+    put_text(b, root, "warning", s->warning);
+}
+
+static void put_all(builder *b, cJSON *root, const morph_summary *s) {
+    put_text(b, root, "title", s->title);
+    put_text(b, root, "scene", s->scene);
+    put_text(b, root, "method", s->method);
+    put_text(b, root, "level", s->level);
+    put_text(b, root, "outcome", s->outcome);
+    put_bool(b, root, "feasible", s->feasible);
+    put_text(b, root, "reason", s->reason);
+    put_number(b, root, "spacing", s->spacing);
+    put_measures(b, root, s);
+    put_margins(b, root, s);
+    cJSON *mobility = put_object(b, root, "mobility");
+    put_number(b, mobility, "free", s->free_motions);
+    put_number(b, mobility, "redundant", s->redundant);
+    put_number(b, mobility, "sigma_min", s->sigma_min);
+    put_number(b, root, "duration", s->has_plan ? s->duration : (double)NAN);
+    put_solver(b, root, s);
+    put_seconds(b, root, s);
+    put_details(b, root, s);
+}
+
+morph_status morph_summary_to_json(const morph_summary *summary, char **text) {
+    *text = NULL;
+    morph_locale locale;
+    if (!morph_locale_enter(&locale)) return MORPH_ERR_NOMEM;
+    builder b = {false};
+    cJSON *root = keep(&b, cJSON_CreateObject());
+    if (root) put_all(&b, root, summary);
+    char *json = b.failed ? NULL : cJSON_Print(root);
+    cJSON_Delete(root);
+    morph_locale_leave(&locale);
+    if (!json) return MORPH_ERR_NOMEM;
+    /* The text is the caller's to free(): the library's own allocator may have been replaced by hooks. */
+    size_t size = strlen(json);
+    *text = malloc(size + 2);
+    if (*text) {
+        memcpy(*text, json, size);
+        memcpy(*text + size, "\n", 2);
+    }
+    cJSON_free(json);
+    return *text ? MORPH_OK : MORPH_ERR_NOMEM;
+}
