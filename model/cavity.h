@@ -29,8 +29,10 @@ typedef struct morph_cavity {
     double start_area;
 } morph_cavity;
 
-/* Keeps pointers to structure and target: both must outlive the cavity. Sample density follows the spacing: 6
- * per skin triangle or better; exposed points at most an eighth of the spacing apart. */
+/* Keeps pointers to structure and target: both must outlive the cavity. 9 samples of equal area per skin
+ * triangle. Exposed points stand at most an eighth of the spacing apart (further only where a target is so
+ * large that this would be more than 20,000), at least 8 along each side of the target; hits below the base
+ * plane do not count. A target may have no exposed point at all (all of it below the base plane). */
 morph_status morph_cavity_create(const morph_structure *structure, const morph_distance *target, double base,
                                  morph_cavity **out);
 void morph_cavity_destroy(morph_cavity *cavity);
@@ -45,8 +47,13 @@ typedef struct morph_measure {
 /* Weight w_c of the target's term in the objective. */
 #define MORPH_COVER_WEIGHT 1.0
 
-/* x: 3*joints. Exact distances throughout. */
+/* x: 3*joints. Exact distances throughout. Without exposed points gap_target is 0 and coverage 1.
+ * MORPH_ERR_NONFINITE if x is not finite. */
 morph_status morph_cavity_measure(const morph_cavity *cavity, const double *x, morph_measure *out);
+
+/* Cavity volume alone, with columns `cell` wide (m) instead of the usual sixteenth of the spacing. Exact
+ * along each column; wider columns are taken where there would be more than 400,000. */
+morph_status morph_cavity_volume(const morph_cavity *cavity, const double *x, double cell, double *volume);
 
 /* For each exposed point the closest skin point: joints and weights (exposed entries each), distance. Arrays
  * are the caller's; any may be NULL. */

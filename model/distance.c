@@ -17,10 +17,13 @@ void morph_distance_destroy(morph_distance *d) {
     free(d);
 }
 
+/* Squared normals grow with the fourth power of lengths: 1e240 still stands. */
+static const double LARGEST = 1e60;
+
 static morph_status mesh_usable(const morph_mesh *mesh) {
     if (!mesh || mesh->vertices < 3 || mesh->triangles < 1 || !mesh->v || !mesh->t) return MORPH_ERR_INPUT;
     for (size_t i = 0; i < 3 * (size_t)mesh->vertices; i++)
-        if (!isfinite(mesh->v[i])) return MORPH_ERR_NONFINITE;
+        if (!(fabs(mesh->v[i]) <= LARGEST)) return MORPH_ERR_NONFINITE;
     for (size_t i = 0; i < 3 * (size_t)mesh->triangles; i++)
         if (mesh->t[i] < 0 || mesh->t[i] >= mesh->vertices) return MORPH_ERR_INPUT;
     return MORPH_OK;

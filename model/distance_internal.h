@@ -69,15 +69,19 @@ bool morph_inside_count(const morph_distance *d, const double p[3]);
 /* Closest point of a facet: squared distance, feature, point. */
 double morph_facet_nearest(const morph_facet *f, const double p[3], int *feature, double point[3]);
 
-/* Squared distance from p to a box; 0 inside. */
+/* max(x, 0) without a branch: in the tree it would be a coin toss. */
+static inline double morph_positive(double x) {
+    return 0.5 * (x + fabs(x));
+}
+/* How far x lies outside [lo, hi]: one of the two parts is 0. */
+static inline double morph_excess(double lo, double hi, double x) {
+    return morph_positive(lo - x) + morph_positive(x - hi);
+}
+/* Squared distance from p to a box; 0 inside, infinite for an absent one. */
 static inline double morph_box_squared(const double lo[3], const double hi[3], const double p[3]) {
-    double sum = 0;
-    for (int k = 0; k < 3; k++) {
-        const double below = lo[k] - p[k], above = p[k] - hi[k];
-        const double out = below > above ? below : above;
-        if (out > 0) sum += out * out;
-    }
-    return sum;
+    const double x = morph_excess(lo[0], hi[0], p[0]), y = morph_excess(lo[1], hi[1], p[1]),
+                 z = morph_excess(lo[2], hi[2], p[2]);
+    return x * x + y * y + z * z;
 }
 
 /* Least signed distance over a segment (corners 2) or triangle (corners 3) that touches or may enter the

@@ -7,7 +7,9 @@
 
 typedef struct morph_sdf morph_sdf; /* immutable after create: may be shared by threads */
 
-/* Grid over [lo, hi] with cells of at most `cell` (m). MORPH_ERR_STOPPED on request. */
+/* Grid over [lo, hi] with cells of at most `cell` (m), at least 4 nodes along each side. MORPH_ERR_STOPPED on
+ * request, MORPH_ERR_INPUT for an empty box or cell, MORPH_ERR_NOMEM also beyond 2^30 nodes. With an open
+ * mesh the distance jumps across its holes, and the spline is as steep there as a cell allows. */
 morph_status morph_sdf_create(const morph_distance *exact, const double lo[3], const double hi[3],
                               double cell, const morph_control *control, morph_sdf **out);
 void morph_sdf_destroy(morph_sdf *sdf);
