@@ -91,39 +91,27 @@ morph_block morph_block_clearance(morph_clearance_rows *data, const int *unknown
                          .describe = clearance_describe};
 }
 
-static void apart(const morph_pair *p, const double *x, double d[3]) {
-    for (int k = 0; k < 3; k++) {
-        d[k] = 0.0;
-        for (int a = 0; a < 4; a++)
-            d[k] += p->weight[a] * x[3 * p->joint[a] + k];
-    }
-}
-
 static morph_status separation_value(void *data, const double *x, double *f) {
     const morph_separation_rows *rows = data;
     for (int r = 0; r < rows->count; r++) {
-        double d[3];
-        apart(&rows->pair[r], x, d);
-        f[r] = morph_dot(d, d);
+        const morph_pair *p = &rows->pair[r];
+        f[r] = 0.0;
+        for (int a = 0; a < 4; a++)
+            f[r] += p->weight[a] * morph_dot(p->normal, &x[3 * p->joint[a]]);
     }
     return MORPH_OK;
 }
 
+/* Linear: no second derivatives. */
 static morph_status separation_walk(void *data, const double *x, const double *weight, morph_sink *sink) {
     const morph_separation_rows *rows = data;
-    for (int r = 0; r < rows->count; r++) {
+    (void)x;
+    (void)weight;
+    for (int r = 0; r < rows->count && morph_sink_wants_jacobian(sink); r++) {
         const morph_pair *p = &rows->pair[r];
-        double d[3];
-        apart(p, x, d);
         for (int a = 0; a < 4; a++)
-            for (int k = 0; k < 3; k++) {
-                if (morph_sink_wants_jacobian(sink))
-                    morph_sink_jacobian(sink, r, 3 * p->joint[a] + k, 2.0 * p->weight[a] * d[k]);
-                for (int b = 0; b < 4 && morph_sink_wants_hessian(sink); b++)
-                    if (p->joint[a] >= p->joint[b])
-                        morph_sink_hessian(sink, 3 * p->joint[a] + k, 3 * p->joint[b] + k,
-                                           2.0 * weight[r] * p->weight[a] * p->weight[b]);
-            }
+            for (int k = 0; k < 3; k++)
+                morph_sink_jacobian(sink, r, 3 * p->joint[a] + k, p->weight[a] * p->normal[k]);
     }
     return MORPH_OK;
 }
@@ -146,8 +134,7 @@ static void separation_describe(void *data, int row, char *text, size_t size) {
 morph_block morph_block_separation(morph_separation_rows *data, const int *unknown, double *lower,
                                    double *upper) {
     for (int r = 0; r < data->count; r++) {
-        const double least = data->pair[r].distance + data->margin;
-        lower[r] = least * least;
+        lower[r] = data->pair[r].distance + data->margin;
         upper[r] = INFINITY;
     }
     return (morph_block){.name = "self clearance",

@@ -66,12 +66,15 @@ typedef struct morph_clearance_rows {
 morph_block morph_block_clearance(morph_clearance_rows *data, const int *unknown, double *lower,
                                   double *upper);
 
-/* Two axes (links or posts) kept apart at fixed parameters: |P - Q|^2 >= (sum of radii + margin)^2. */
+/* Two axes (links or posts) kept apart at fixed parameters along a fixed unit normal: n.(P - Q) >= distance +
+ * margin. At the closest points with n along P - Q this is the exact distance; a row keeps its side, so that
+ * axes cannot pass through each other. */
 typedef struct morph_pair {
     int joint[4];     /* a0, a1, b0, b1 */
     double weight[4]; /* 1-s, s, -(1-t), -t */
-    double distance;  /* least distance allowed between the axes, spacings */
-    int axis[2];      /* link number, or links + post number */
+    double normal[3];
+    double distance; /* least distance allowed between the axes, spacings */
+    int axis[2];     /* link number, or links + post number */
 } morph_pair;
 typedef struct morph_separation_rows {
     const morph_structure *structure;

@@ -54,6 +54,12 @@ void morph_active_destroy(morph_active *a) {
     free(a);
 }
 
+void morph_active_clear(morph_active *a, const morph_structure *s) {
+    a->links = a->tuples = a->points = a->pairs = 0;
+    memset(a->has_link, 0, (size_t)s->links * sizeof *a->has_link);
+    memset(a->has_tuple, 0, (size_t)(s->link_posts + s->link_links) * sizeof *a->has_tuple);
+}
+
 int morph_active_rows(const morph_active *a, const morph_structure *s) {
     return s->posts + a->links + a->tuples + a->points + a->pairs;
 }
@@ -282,12 +288,13 @@ static void examine_pair(examiner *e, int a, int b) {
                        .weight = {1.0 - u, u, v - 1.0, -v},
                        .distance = apart,
                        .axis = {a, b}};
-    for (int n = 0; n < e->active->pairs; n++) {
-        const morph_pair *o = &e->active->pair[n];
-        if (o->axis[0] == a && o->axis[1] == b && fabs(o->weight[1] - u) < 0.05 &&
-            fabs(o->weight[3] + v) < 0.05)
-            return;
-    }
+    for (int k = 0; k < 3; k++)
+        for (int m = 0; m < 4; m++)
+            pair.normal[k] += pair.weight[m] * e->x[3 * pair.joint[m] + k];
+    /* Axes that cross have no side: the row would be made of rounding. The examination names them. */
+    if (d < 1e-6) return;
+    for (int k = 0; k < 3; k++)
+        pair.normal[k] /= d;
     if (!grow((void **)&e->active->pair, &e->active->pair_capacity, e->active->pairs + 1, sizeof pair)) {
         e->status = MORPH_ERR_NOMEM;
         return;
@@ -361,6 +368,7 @@ morph_status morph_pose_examine(const morph_world *world, const double *x, const
         e.metres[i] = x[i] * s->spacing;
         if (!isfinite(x[i])) e.status = MORPH_ERR_NONFINITE;
     }
+    if (active) active->pairs = 0;
     if (e.status == MORPH_OK) {
         examine_members(&e);
         examine_angles(&e);

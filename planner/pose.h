@@ -37,7 +37,7 @@ typedef struct morph_violation {
     char element[MORPH_LIMITS][112];
 } morph_violation;
 
-/* Rows of one pose. Grows only. */
+/* Rows of one pose. Examinations add to them; pairs are measured anew each time. */
 typedef struct morph_active {
     int links, tuples, points, pairs;
     int *link, *tuple; /* capacity: all of them */
@@ -57,6 +57,8 @@ typedef struct morph_active {
 
 morph_status morph_active_create(const morph_structure *structure, morph_active **out);
 void morph_active_destroy(morph_active *active);
+/* Forgets all rows, keeps the memory. */
+void morph_active_clear(morph_active *active, const morph_structure *structure);
 
 /* How near to its limit a row must stand to enter. Spacings, radians. */
 typedef struct morph_nearness {

@@ -19,7 +19,8 @@ morph_refine_options morph_refine_defaults(void) {
     return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 1e-3, .self = 1e-3},
                                   .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.1,
-                                  .reach = 0.3,
+                                  .reach = 0.4,
+                                  .hold = 1e-3,
                                   .rounds = 12};
 }
 
@@ -30,11 +31,12 @@ typedef struct refiner {
     morph_active *active;
     int (*cover_joint)[3];
     double (*cover_weight)[3];
-    double *x, *best, *metres, *base, *lower, *upper; /* coordinates each; all but metres scaled */
+    double *x, *best, *metres, *base, *anchor, *lower, *upper; /* coordinates each; all but metres scaled */
     morph_control quiet; /* the caller's control without its log: the solver's own lines are too many */
     double best_objective;
     double best_violation;
     bool best_feasible, have_best;
+    double reach;
     double started;
 } refiner;
 
@@ -44,12 +46,13 @@ static morph_status allocate(refiner *r) {
     r->best = morph_alloc(n, sizeof(double));
     r->metres = morph_alloc(n, sizeof(double));
     r->base = morph_alloc(n, sizeof(double));
+    r->anchor = morph_alloc(n, sizeof(double));
     r->lower = morph_alloc(n, sizeof(double));
     r->upper = morph_alloc(n, sizeof(double));
     r->cover_joint = morph_alloc(y, sizeof(int[3]));
     r->cover_weight = morph_alloc(y, sizeof(double[3]));
-    if (!r->x || !r->best || !r->metres || !r->base || !r->lower || !r->upper || !r->cover_joint ||
-        !r->cover_weight)
+    if (!r->x || !r->best || !r->metres || !r->base || !r->anchor || !r->lower || !r->upper ||
+        !r->cover_joint || !r->cover_weight)
         return MORPH_ERR_NOMEM;
     return morph_active_create(r->world->structure, &r->active);
 }
@@ -59,6 +62,7 @@ static void release(refiner *r) {
     free(r->best);
     free(r->metres);
     free(r->base);
+    free(r->anchor);
     free(r->lower);
     free(r->upper);
     free(r->cover_joint);
@@ -103,7 +107,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     morph_status status =
         morph_cavity_closest(r->world->cavity, r->metres, r->cover_joint, r->cover_weight, NULL);
     if (status != MORPH_OK) return status;
-    morph_block blocks[MORPH_POSE_BLOCKS + 2];
+    morph_block blocks[MORPH_POSE_BLOCKS + 3];
     int count = morph_active_blocks(r->active, r->world, NULL, &r->options->inset, blocks);
     if (count < 0) return MORPH_ERR_NOMEM;
     /* The kink between target and base plane is rounded over a tenth of a spacing: the width of a link and
@@ -112,13 +116,19 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     morph_cover_term cover = {r->world->cavity, (const int(*)[3])r->cover_joint,
                               (const double(*)[3])r->cover_weight, r->options->slide,
                               r->options->cover_weight};
+    /* Half of the joints are in no term of the objective: held weakly where they stand, they take the
+     * shortest way, and the Hessian is regular. The weight is small against the gap's (1 per spacing^2 of
+     * skin), and the pull vanishes as the rounds settle. */
+    memcpy(r->anchor, r->x, (size_t)n * sizeof *r->x);
+    morph_near_term near = {n, r->anchor, r->options->hold};
+    blocks[count++] = morph_block_near(&near, NULL);
     blocks[count++] = morph_block_gap(&gap, NULL);
     blocks[count++] = morph_block_cover(&cover, NULL);
     char message[256] = "";
     morph_nlp *nlp = NULL;
     for (int i = 0; i < n; i++) {
-        r->lower[i] = fmax(r->base[i], r->x[i] - r->options->reach);
-        r->upper[i] = fmax(r->lower[i], r->x[i]) + r->options->reach;
+        r->lower[i] = fmax(r->base[i], r->x[i] - r->reach);
+        r->upper[i] = fmax(r->lower[i], r->x[i]) + r->reach;
     }
     status = morph_nlp_create(n, r->x, r->lower, r->upper, blocks, count, message, sizeof message, &nlp);
     if (status != MORPH_OK) {
@@ -154,39 +164,46 @@ static void tally(refiner *r, const morph_nlp_result *result) {
     p->last = result->outcome;
 }
 
+/* Rows for a round: all that a move of `reach` can bring to their limits. Two ends move apart by up to twice
+ * that, an angle turns by that over a length; most moves are far smaller, and what is missed shows in the
+ * next examination. */
+static morph_status examine(refiner *r, morph_violation *v) {
+    const morph_nearness near = {
+        .length = r->reach, .angle = r->reach, .clearance = r->reach, .self = r->reach};
+    morph_active_clear(r->active, r->world->structure);
+    return morph_pose_examine(r->world, r->x, &r->options->inset, &near, r->active, NULL, v);
+}
+
 static morph_status rounds(refiner *r) {
     const morph_refine_options *o = r->options;
-    /* Two ends move apart by twice the reach, and an angle turns by that over a length: about the most that
-     * one round can do. */
-    const double reach = o->reach;
-    const morph_nearness near = {.length = reach, .angle = reach, .clearance = reach, .self = reach};
     morph_violation v;
-    double objective;
-    morph_status status = morph_pose_examine(r->world, r->x, &o->inset, &near, r->active, NULL, &v);
+    double objective, before = INFINITY;
+    r->reach = o->reach;
+    morph_status status = examine(r, &v);
     if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
-    double before = INFINITY;
     for (int round = 0; round < o->rounds && status == MORPH_OK; round++) {
         morph_nlp_result result = {0};
         status = solve_round(r, round, &result);
         if (status != MORPH_OK) break;
         tally(r, &result);
         memcpy(r->x, result.x, 3 * (size_t)r->world->structure->joints * sizeof *r->x);
-        int added = 0;
-        status = morph_pose_examine(r->world, r->x, &o->inset, &near, r->active, &added, &v);
+        r->reach = fmax(0.75 * r->reach, 0.05);
+        status = examine(r, &v);
         if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
         morph_limit which = MORPH_LIMIT_POST;
         const double worst = morph_violation_worst(&v, morph_pose_tolerance, &which);
         morph_log(o->control,
-                  "refine: round %d: %s after %d iterations (%s), objective %.6g, worst %s %.3g (%s), %d "
-                  "rows added",
+                  "refine: round %d: %s after %d iterations (%s), %.2f s, objective %.6g, worst %s %.3g "
+                  "(%s), %d rows",
                   round + 1, morph_outcome_text(result.outcome), result.iterations, result.solver_text,
-                  objective, morph_limit_name(which), v.amount[which], v.element[which], added);
+                  result.seconds, objective, morph_limit_name(which), v.amount[which], v.element[which],
+                  result.rows);
         morph_nlp_result_free(&result);
         morph_progress(o->control, "refine", (round + 1.0) / o->rounds);
         if (morph_stopped(o->control)) status = MORPH_ERR_STOPPED;
         if (o->seconds > 0.0 && morph_seconds() - r->started > o->seconds) break;
-        /* Settled: inside every limit, and a round gained less than half a per cent. */
-        if (worst <= 1.0 && objective > 0.995 * before) break;
+        /* Settled: inside every limit, and a round gained less than a per cent. */
+        if (worst <= 1.0 && objective > 0.99 * before) break;
         before = objective;
     }
     return status;

@@ -10,6 +10,7 @@ typedef struct morph_refine_options {
     double cover_weight; /* w_c */
     double slide;        /* pull across the target's normal, relative to along it */
     double reach;        /* how far a joint may move in one round, spacings: rows are chosen for that reach */
+    double hold;         /* weight that keeps free joints where they stand */
     int rounds;          /* solves, at most */
     double seconds;      /* wall; <= 0: none */
     const morph_control *control;
