@@ -174,84 +174,9 @@ static morph_status stl_claims(const char *data, size_t *size, const morph_sente
     return MORPH_OK;
 }
 
-/* ---- OFF ---- */
-
-/* Skips blanks and comments. */
-static const char *off_skip(const char *p, const char *end) {
-    while (p < end) {
-        if (*p == '#')
-            while (p < end && *p != '\n')
-                p++;
-        else if (isspace((unsigned char)*p))
-            p++;
-        else
-            break;
-    }
-    return p;
-}
-
-/* A count, or false where none stands there. */
-static bool off_count(const char **p, const char *end, unsigned long long *count) {
-    *p = off_skip(*p, end);
-    if (*p >= end || !isdigit((unsigned char)**p)) return false;
-    char *stop;
-    *count = strtoull(*p, &stop, 10);
-    *p = stop;
-    return true;
-}
-
-/* A face line: the number of corners, and as many numbers of vertices; colours may follow. */
-static bool off_face(const char *p, const char *end, unsigned long long vertices) {
-    unsigned long long corners, at;
-    if (!off_count(&p, end, &corners)) return false;
-    for (; corners > 0; corners--)
-        if (!off_count(&p, end, &at) || at >= vertices) return false;
-    return true;
-}
-
-/* "OFF" with prefixes, three counts, then a line for each vertex and each face. */
-static morph_status off_claims(const char *data, size_t size, const morph_sentence *to) {
-    const char *end = data + size, *p = off_skip(data, end);
-    unsigned long long vertices, faces, edges;
-    const char *word = p;
-    while (p < end && isalnum((unsigned char)*p))
-        p++;
-    if (p - word < 3 || strncmp(p - 3, "OFF", 3) != 0)
-        return morph_refuse(to, "'%s' is no OFF file: that begins with 'OFF'", to->name);
-    p = off_skip(p, end);
-    if (end - p >= 6 && strncmp(p, "BINARY", 6) == 0)
-        return morph_refuse(to, "'%s' is a binary OFF file; only text ones are read", to->name);
-    if (!off_count(&p, end, &vertices) || !off_count(&p, end, &faces))
-        return morph_refuse(to, "'%s' has no counts of vertices and faces after 'OFF'", to->name);
-    const char *rest = p;
-    if (!off_count(&p, end, &edges)) p = rest;
-    p = next_line(p, end);
-    /* The shortest vertex line is "0 0 0", the shortest face line "1 0". */
-    if (vertices > size / 5 || faces > size / 3)
-        return morph_refuse(to,
-                            "'%s' is truncated: its header claims %llu vertices and %llu faces, the file "
-                            "has %zu bytes",
-                            to->name, vertices, faces, size);
-    for (unsigned long long i = 0; i < vertices + faces; i++) {
-        p = off_skip(p, end);
-        if (p >= end)
-            return morph_refuse(to,
-                                "'%s' is truncated: its header claims %llu vertices and %llu faces, it "
-                                "ends after %llu of these lines",
-                                to->name, vertices, faces, i);
-        if (i >= vertices && !off_face(p, next_line(p, end), vertices))
-            return morph_refuse(to,
-                                "'%s' is damaged: face %llu is no count and numbers of vertices below %llu",
-                                to->name, i - vertices, vertices);
-        p = next_line(p, end);
-    }
-    return MORPH_OK;
-}
-
 morph_status morph_import_claims(const char *ending, const char *data, size_t *size,
                                  const morph_sentence *sentence) {
     if (strcmp(ending, "stl") == 0) return stl_claims(data, size, sentence);
-    if (strcmp(ending, "off") == 0) return off_claims(data, *size, sentence);
     if (strcmp(ending, "ply") == 0) return morph_import_ply_claims(data, *size, sentence);
     if (strcmp(ending, "gltf") == 0) return morph_import_gltf_claims(data, *size, false, sentence);
     if (strcmp(ending, "glb") == 0) return morph_import_gltf_claims(data, *size, true, sentence);

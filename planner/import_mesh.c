@@ -221,18 +221,23 @@ static void add_polygon(gather *g, int n, bool mirrored) {
     }
 }
 
-static morph_status add_face(gather *g, const struct aiMesh *from, unsigned f, const double m[12],
-                             bool mirrored) {
-    const struct aiFace *face = from->mFaces + f;
-    const unsigned n = face->mNumIndices;
-    if (n < 3) return MORPH_OK; /* points and lines */
+/* Room for a polygon of n corners, within the limits. */
+static morph_status admit(gather *g, unsigned n) {
     if (n > MORPH_IMPORT_CORNERS)
         return morph_refuse(g->sentence, "'%s' has a polygon of %u corners; at most %d are allowed",
                             g->sentence->name, n, MORPH_IMPORT_CORNERS);
     if (n - 2 > (unsigned)(MORPH_IMPORT_TRIANGLES - g->triangles))
         return morph_refuse(g->sentence, "'%s' has more than the %d triangles that are allowed",
                             g->sentence->name, MORPH_IMPORT_TRIANGLES);
-    const morph_status status = make_room(g, (size_t)g->vertices + n, (size_t)g->triangles + n - 2);
+    return make_room(g, (size_t)g->vertices + n, (size_t)g->triangles + n - 2);
+}
+
+static morph_status add_face(gather *g, const struct aiMesh *from, unsigned f, const double m[12],
+                             bool mirrored) {
+    const struct aiFace *face = from->mFaces + f;
+    const unsigned n = face->mNumIndices;
+    if (n < 3) return MORPH_OK; /* points and lines */
+    const morph_status status = admit(g, n);
     if (status != MORPH_OK) return status;
     for (unsigned i = 0; i < n; i++) {
         const unsigned at = face->mIndices[i];
@@ -267,18 +272,31 @@ static morph_status add_mesh(gather *g, const struct aiMesh *from, const double 
 static morph_status gather_scene(const struct aiScene *scene, gather *g) {
     placed *list = NULL;
     size_t nodes = 0;
-    g->polygon = morph_alloc(MORPH_IMPORT_CORNERS, sizeof *g->polygon);
-    g->cut = morph_alloc(3 * MORPH_IMPORT_CORNERS, sizeof *g->cut);
-    morph_status status = g->polygon && g->cut ? MORPH_OK : MORPH_ERR_NOMEM;
-    if (status == MORPH_OK && scene->mRootNode) status = place_nodes(scene->mRootNode, &list, &nodes);
+    morph_status status = MORPH_OK;
+    if (scene->mRootNode) status = place_nodes(scene->mRootNode, &list, &nodes);
     for (size_t i = 0; i < nodes && status == MORPH_OK; i++)
         for (unsigned k = 0; k < list[i].node->mNumMeshes && status == MORPH_OK; k++) {
             const unsigned which = list[i].node->mMeshes[k];
             if (which < scene->mNumMeshes) status = add_mesh(g, scene->mMeshes[which], list[i].m);
         }
     free(list);
-    free(g->polygon);
-    free(g->cut);
+    return status;
+}
+
+static morph_status gather_polygons(const morph_polygons *from, gather *g) {
+    morph_status status = make_room(g, (size_t)from->vertices, 1);
+    const int *corner = from->corner;
+    if (status != MORPH_OK) return status;
+    if (from->vertices > 0) memcpy(g->v, from->v, 3 * (size_t)from->vertices * sizeof *g->v);
+    g->vertices = from->vertices;
+    for (int f = 0; f < from->polygons && status == MORPH_OK; corner += from->n[f++]) {
+        const int n = from->n[f];
+        if (n < 3) continue;
+        status = admit(g, (unsigned)n);
+        if (status != MORPH_OK) break;
+        memcpy(g->polygon, corner, (size_t)n * sizeof *corner);
+        add_polygon(g, n, false);
+    }
     return status;
 }
 
@@ -324,28 +342,66 @@ static morph_status refuse_assimp(const morph_sentence *to) {
     return morph_refuse(to, "'%s' is damaged or no mesh (%s)", to->name, n > 0 ? why : "no reason given");
 }
 
-static morph_status refuse_faceless(const struct aiScene *scene, const morph_sentence *to) {
-    unsigned long long points = 0;
-    for (unsigned i = 0; i < scene->mNumMeshes; i++)
-        points += scene->mMeshes[i]->mNumVertices;
-    if (points > 0)
-        return morph_refuse(to, "'%s' holds nothing but points or lines; a target needs faces", to->name);
-    return morph_refuse(to, "'%s' is no mesh: it holds no faces", to->name);
+static morph_status begin(gather *g, const morph_sentence *sentence) {
+    *g = (gather){.sentence = sentence};
+    g->polygon = morph_alloc(MORPH_IMPORT_CORNERS, sizeof *g->polygon);
+    g->cut = morph_alloc(3 * MORPH_IMPORT_CORNERS, sizeof *g->cut);
+    return g->polygon && g->cut ? MORPH_OK : MORPH_ERR_NOMEM;
+}
+
+/* Hands the triangles over, or drops them. points: the vertices that the file has, used or not. */
+static morph_status finish(gather *g, morph_status status, unsigned long long points, morph_mesh *mesh,
+                           int *crossing) {
+    const morph_sentence *to = g->sentence;
+    free(g->polygon);
+    free(g->cut);
+    if (status == MORPH_OK && g->triangles == 0)
+        status = points > 0 ? morph_refuse(to, "'%s' holds nothing but points or lines; a target needs faces",
+                                           to->name)
+                            : morph_refuse(to, "'%s' is no mesh: it holds no faces", to->name);
+    if (status != MORPH_OK) {
+        free(g->v);
+        free(g->t);
+        return status;
+    }
+    *mesh = (morph_mesh){g->vertices, g->triangles, g->v, g->t};
+    *crossing = g->crossing;
+    return MORPH_OK;
+}
+
+static morph_status import_off(const char *data, size_t size, const morph_sentence *sentence,
+                               morph_mesh *mesh, int *crossing) {
+    morph_polygons polygons;
+    gather g;
+    morph_status status = morph_import_off(data, size, sentence, &polygons);
+    if (status != MORPH_OK) return status;
+    status = begin(&g, sentence);
+    if (status == MORPH_OK) status = gather_polygons(&polygons, &g);
+    const int points = polygons.vertices;
+    morph_polygons_free(&polygons);
+    return finish(&g, status, (unsigned long long)points, mesh, crossing);
 }
 
 static morph_status import_scene(const struct aiScene *scene, const morph_sentence *sentence,
                                  morph_mesh *mesh, int *crossing) {
-    gather g = {.sentence = sentence};
-    morph_status status = gather_scene(scene, &g);
-    if (status == MORPH_OK && g.triangles == 0) status = refuse_faceless(scene, sentence);
-    if (status != MORPH_OK) {
-        free(g.v);
-        free(g.t);
-        return status;
-    }
-    *mesh = (morph_mesh){g.vertices, g.triangles, g.v, g.t};
-    *crossing = g.crossing;
-    return MORPH_OK;
+    gather g;
+    unsigned long long points = 0;
+    morph_status status = begin(&g, sentence);
+    if (status == MORPH_OK) status = gather_scene(scene, &g);
+    for (unsigned i = 0; i < scene->mNumMeshes; i++)
+        points += scene->mMeshes[i]->mNumVertices;
+    return finish(&g, status, points, mesh, crossing);
+}
+
+static morph_status import_assimp(const char *path, const char *data, size_t size, bool others,
+                                  const morph_sentence *sentence, morph_mesh *mesh, int *crossing) {
+    served files = {path, data, size, others};
+    struct aiFileIO io = {file_open, file_close, (char *)&files};
+    const struct aiScene *scene = aiImportFileEx(path, 0, &io);
+    if (!scene) return refuse_assimp(sentence);
+    const morph_status status = import_scene(scene, sentence, mesh, crossing);
+    aiReleaseImport(scene);
+    return status;
 }
 
 morph_status morph_import_mesh(const char *path, const morph_sentence *sentence, morph_mesh *mesh,
@@ -360,11 +416,10 @@ morph_status morph_import_mesh(const char *path, const morph_sentence *sentence,
     if (status == MORPH_OK) status = check_ending(ending, sentence);
     if (status == MORPH_OK) status = morph_import_claims(ending, data, &size, sentence);
     if (status == MORPH_OK) {
-        served files = {path, data, size, strcmp(ending, "gltf") == 0};
-        struct aiFileIO io = {file_open, file_close, (char *)&files};
-        const struct aiScene *scene = aiImportFileEx(path, 0, &io);
-        status = scene ? import_scene(scene, sentence, mesh, crossing) : refuse_assimp(sentence);
-        if (scene) aiReleaseImport(scene);
+        if (strcmp(ending, "off") == 0)
+            status = import_off(data, size, sentence, mesh, crossing);
+        else
+            status = import_assimp(path, data, size, strcmp(ending, "gltf") == 0, sentence, mesh, crossing);
     }
     free(data);
     return status;

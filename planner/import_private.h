@@ -29,7 +29,7 @@ morph_refuse(const morph_sentence *to, const char *format, ...);
  * where it is missing, no regular file, empty, unreadable or beyond the limit. */
 morph_status morph_import_load(const char *path, const morph_sentence *sentence, char **data, size_t *size);
 
-/* Compares what the headers of STL, PLY, OFF and glTF claim, lists included, with the bytes that are there,
+/* Compares what the headers of STL, PLY and glTF claim, lists included, with the bytes that are there,
  * before anything is allocated by such a claim. ending: lower case, no dot; others pass. *size may shrink to
  * the bytes that belong to the mesh (a binary STL with something behind it). */
 morph_status morph_import_claims(const char *ending, const char *data, size_t *size,
@@ -37,6 +37,20 @@ morph_status morph_import_claims(const char *ending, const char *data, size_t *s
 morph_status morph_import_ply_claims(const char *data, size_t size, const morph_sentence *sentence);
 morph_status morph_import_gltf_claims(const char *data, size_t size, bool binary,
                                       const morph_sentence *sentence);
+
+/* Polygons as a file lists them: n[i] corners each, one after the other in `corner`. Zeroed is empty. */
+typedef struct morph_polygons {
+    int vertices, polygons;
+    double *v;   /* 3 * vertices */
+    int *n;      /* polygons */
+    int *corner; /* sum of n, each below vertices */
+} morph_polygons;
+
+void morph_polygons_free(morph_polygons *polygons);
+
+/* OFF is read here: assimp 5.2 leaves out polygons of more than nine corners without a word. */
+morph_status morph_import_off(const char *data, size_t size, const morph_sentence *sentence,
+                              morph_polygons *out);
 
 /* The file's polygons as triangles, node transforms applied; vertices as the file has them (not welded).
  * *crossing: polygons that cross themselves, cut into a fan for want of anything better. */

@@ -243,6 +243,47 @@ static void concave_polygons(void **state) {
     morph_mesh_free(&b.mesh);
 }
 
+/* A prism over a polygon of many corners, in each text format: none may be left out. */
+static void many_corners(void **state) {
+    (void)state;
+    enum { N = 40 };
+    const char *kinds[] = {"off", "ply", "obj"};
+    for (int kind = 0; kind < 3; kind++) {
+        char text[16384], name[32];
+        size_t n = 0;
+        const int o = kind == 2 ? 1 : 0;
+        if (kind == 0) n += (size_t)snprintf(text, sizeof text, "OFF %d %d\n", 2 * N, N + 2);
+        if (kind == 1)
+            n += (size_t)snprintf(text, sizeof text,
+                                  "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\n"
+                                  "property double y\nproperty double z\nelement face %d\n"
+                                  "property list uchar uint vertex_index\nend_header\n",
+                                  2 * N, N + 2);
+        for (int i = 0; i < 2 * N; i++)
+            n += (size_t)snprintf(text + n, sizeof text - n, "%s%.9f %.9f %d\n", o ? "v " : "",
+                                  cos(2 * M_PI * i / N), sin(2 * M_PI * i / N), i / N);
+        for (int end = 0; end < 2; end++) {
+            n += (size_t)snprintf(text + n, sizeof text - n, o ? "f" : "%d", N);
+            for (int i = 0; i < N; i++)
+                n += (size_t)snprintf(text + n, sizeof text - n, " %d", (end ? N + i : N - 1 - i) + o);
+            n += (size_t)snprintf(text + n, sizeof text - n, "\n");
+        }
+        for (int i = 0; i < N; i++)
+            n += (size_t)snprintf(text + n, sizeof text - n, "%s %d %d %d %d\n", o ? "f" : "4", i + o,
+                                  (i + 1) % N + o, (i + 1) % N + N + o, i + N + o);
+        assert_true(n < sizeof text);
+        snprintf(name, sizeof name, "prism.%s", kinds[kind]);
+        const morph_target_def def = mesh_def(write_text(name, text));
+        built b = good(&def);
+        assert_true(b.report.closed);
+        assert_int_equal(b.report.vertices, 2 * N);
+        assert_int_equal(b.report.triangles, 4 * N - 4);
+        assert_near(b.report.volume, 0.5 * N * sin(2 * M_PI / N), 1e-6);
+        remove(path_of(name));
+        morph_mesh_free(&b.mesh);
+    }
+}
+
 static void inside_out_is_turned(void **state) {
     (void)state;
     char text[4096];
@@ -514,6 +555,7 @@ int main(void) {
         cmocka_unit_test(binary_formats),
         cmocka_unit_test(gltf_nodes_are_applied),
         cmocka_unit_test(concave_polygons),
+        cmocka_unit_test(many_corners),
         cmocka_unit_test(inside_out_is_turned),
         cmocka_unit_test(a_quad_with_two_equal_corners),
         cmocka_unit_test(rotate_fit_place),

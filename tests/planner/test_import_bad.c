@@ -222,7 +222,7 @@ static void points_lines_and_nothing(void **state) {
                  "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
                  "property float z\nend_header\n0 0 0\n1 0 0\n0 1 0\n",
                  "nothing but points");
-    text_refused("points.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", "'points.off'");
+    text_refused("points.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", "nothing but points");
     text_refused("needle.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "no area");
     text_refused("fold.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n", "encloses no volume");
 }
@@ -232,7 +232,7 @@ static void numbers_that_are_none(void **state) {
     text_refused("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
                  "'nan.obj'");
     text_refused("inf.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 inf 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n",
-                 "'inf.off'");
+                 "no finite number");
     unsigned char bytes[84 + 50] = {0};
     const float nan = NAN;
     bytes[80] = 1;
