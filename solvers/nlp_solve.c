@@ -2,7 +2,6 @@
  * point. */
 #include "solvers/nlp_internal.h"
 
-#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>

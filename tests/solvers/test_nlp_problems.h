@@ -131,6 +131,24 @@ static inline morph_block quadratic_block(quadratic *q, const double *lower, con
                          .walk = quadratic_walk};
 }
 
+/* ---- minimise sum x + |x|^2 / 2 with x0 + x1 + x2 >= 1 from a feasible or an infeasible start. */
+typedef struct small {
+    quadratic cost, rows;
+    double lower, upper;
+    morph_block blocks[2];
+} small;
+
+static inline void small_init(small *s) {
+    *s = (small){.cost = {.unknowns = 3, .a = {{1, 2, 3}}, .b = {1}},
+                 .rows = {.rows = 1, .unknowns = 3, .a = {{1, 1, 1}}, .b = {0.25}},
+                 .lower = 1,
+                 .upper = INFINITY};
+    s->blocks[0] = quadratic_block(&s->cost, NULL, NULL);
+    s->blocks[1] = quadratic_block(&s->rows, &s->lower, &s->upper);
+}
+
+static const double feasible_start[3] = {5, 4, 3};
+
 /* ---- a chain of points hanging between two fixed ends: minimise sum of heights, every link's
  * |d|^2 / L^2 = 1. Unknowns x_0 y_0 x_1 y_1 ...; the ends are fixed by equal bounds. */
 
