@@ -17,6 +17,7 @@ typedef struct clearance {
     double *joint_radius;
     double skin_radius;
     morph_status status;
+    morph_sweep *sweep; /* the search that asks */
     /* the element at hand */
     morph_element element;
     const int *corner;
@@ -106,7 +107,9 @@ static bool in_box(const clearance *c, const double p[3]) {
     return true;
 }
 
-static double depth(const clearance *c, const double q[9]) {
+/* A depth costs as much as some 15 distances, and the search's budget is meant as time. */
+static double depth(clearance *c, const double q[9]) {
+    c->sweep->evaluations += 15;
     morph_closest at;
     double weight[3];
     if (c->corners == 1)
@@ -204,8 +207,9 @@ static morph_status search(clearance *c, const morph_control *control, double h,
     const morph_record *r = c->r;
     morph_finding *m = &f->kind[MORPH_MARGIN_CLEARANCE];
     const int n = element_count(r);
-    /* Slack: a tenth of the tolerance, so that no depth beyond 1.1e-3 spacings passes unseen. Budget: some
-     * hundred times what plans need; only a record that races along the surface runs out of it. */
+    /* Slack: a tenth of the tolerance, so that no depth beyond 1.1e-3 spacings passes unseen. Budget: a
+     * sheet that slides over a plane a spacing far with everything in contact takes half of it, a usual plan
+     * a thousandth; only a record that races along the surface runs out. */
     morph_sweep s = {clearance_value,
                      clearance_travel,
                      c,
@@ -218,6 +222,7 @@ static morph_status search(clearance *c, const morph_control *control, double h,
                      1000000 + 10000L * n,
                      false,
                      false};
+    c->sweep = &s;
     ends(c, &s, value, m);
     int joint;
     for (int i = 0; i < n && !s.failed && !s.exhausted; i++) {

@@ -20,8 +20,8 @@ typedef struct table {
 } table;
 
 /* Largest rounding error of the samples: half a unit of the last decimal place that the table uses, found as
- * the least number of places (6 to 17) that reproduces every number to double precision. A table written with
- * fewer digits than the nine of the contract gets the allowance of nine, not more. */
+ * the least number of places (from nine digits on) that reproduces every number to double precision. A table
+ * written with fewer digits than the nine of the contract gets the allowance of nine, not more. */
 static double rounding_of(const double *length, size_t n) {
     double longest = 0;
     for (size_t i = 0; i < n; i++)
@@ -141,7 +141,8 @@ static bool usable_table(const morph_record *r, const double *time, const double
             return false;
         }
     }
-    /* Times written with nine digits are off by up to 5e-9 of the last; 1e-4 of a step otherwise. */
+    /* Times written with nine digits are off by up to 5e-9 of the last; never more than a hundredth of a
+     * step. */
     const double h = morph_check_step(time, samples);
     const double tolerance = 1e-8 * fabs(time[samples - 1]) + 1e-6 * h;
     if (!(h >= 1e-30)) {

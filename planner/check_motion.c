@@ -21,16 +21,20 @@ int morph_motion_weights(int samples, double tau, double weight[4], int *count) 
     return first;
 }
 
-void morph_motion_point(const morph_motion *m, int point, double tau, double out[3]) {
-    double w[4];
-    int n;
-    const int first = morph_motion_weights(m->samples, tau, w, &n);
+static void weighted(const morph_motion *m, int point, int first, const double w[4], int n, double out[3]) {
     out[0] = out[1] = out[2] = 0;
     for (int i = 0; i < n; i++) {
         const double *x = m->x + 3 * ((size_t)(first + i) * (size_t)m->points + (size_t)point);
         for (int k = 0; k < 3; k++)
             out[k] += w[i] * x[k];
     }
+}
+
+void morph_motion_point(const morph_motion *m, int point, double tau, double out[3]) {
+    double w[4];
+    int n;
+    const int first = morph_motion_weights(m->samples, tau, w, &n);
+    weighted(m, point, first, w, n, out);
 }
 
 /* Speed bound over one interval. Over u in [0,1] the motion is a cubic; its Bernstein points b0..b3 follow
@@ -57,10 +61,14 @@ morph_status morph_motion_create(const double *x, int samples, int points, morph
     for (int k = 0; k + 1 < samples; k++) {
         const double *now = m.travel + (size_t)k * (size_t)points;
         double *next = m.travel + (size_t)(k + 1) * (size_t)points;
+        double w[4][4];
+        int first[4], n = 0;
+        for (int i = 0; i < 4; i++)
+            first[i] = morph_motion_weights(samples, i < 3 ? k + i / 3.0 : k + 1.0, w[i], &n);
         for (int j = 0; j < points; j++) {
             double p[4][3];
             for (int i = 0; i < 4; i++)
-                morph_motion_point(&m, j, i < 3 ? k + i / 3.0 : k + 1.0, p[i]);
+                weighted(&m, j, first[i], w[i], n, p[i]);
             next[j] = now[j] + speed_bound((const double(*)[3])p);
         }
     }
@@ -125,6 +133,12 @@ typedef struct span {
     double from, from_value, to, to_value;
 } span;
 
+/* A margin far from its limit, on either side, needs no more than two digits; near it the slack alone counts.
+ * Without this, deep inside a target where many elements are equally deep, the search would not end soon. */
+static double allowed(const morph_sweep *s) {
+    return s->slack + 0.01 * fabs(s->least);
+}
+
 /* On [a, b] with travel D, |f(t) - f(a)| + |f(t) - f(b)| <= D, hence f(t) >= (f(a) + f(b) - D) / 2: a span
  * whose bound is not below least - slack needs no look inside, any other is halved. Since f(a), f(b) >=
  * least, D <= 2 slack always ends it. */
@@ -147,7 +161,7 @@ bool morph_sweep_run(morph_sweep *s, double from, double from_value, double to, 
     while (top > 0 && !s->failed) {
         const span p = stack[--top];
         const double travel = s->travel(s->data, p.from, p.to);
-        if (0.5 * (p.from_value + p.to_value - travel) >= s->least - s->slack) continue;
+        if (0.5 * (p.from_value + p.to_value - travel) >= s->least - allowed(s)) continue;
         const double width = p.to - p.from, middle = p.from + 0.5 * width;
         if (width < 1e-9 || top + 2 > DEPTH || s->evaluations >= s->budget) {
             s->exhausted = true;

@@ -77,8 +77,8 @@ int morph_check_even(const double *time, int samples, double tolerance);
 
 /* Length, rate, acceleration and jerk between samples (quintic Hermite), rest and consistency. */
 void morph_check_curves(const morph_record *r, morph_findings *f);
-/* Length of a link at sample interval k, fine step i of MORPH_CHECK_FINE (0 .. MORPH_CHECK_FINE). */
-double morph_check_curve_length(const morph_record *r, int link, int k, int i);
+/* Lengths (links) of the curves at fine step i (0 .. MORPH_CHECK_FINE) of sample interval k. */
+void morph_check_curve_lengths(const morph_record *r, int k, int i, double *length);
 
 /* Posts, panels, angles, base, compatibility on the fine grid; held posts. */
 morph_status morph_check_poses(const morph_record *r, const morph_control *control, morph_findings *f);
@@ -112,7 +112,7 @@ typedef struct morph_sweep {
     double (*value)(void *data, double tau);              /* NaN: failed */
     double (*travel)(void *data, double from, double to); /* bound on the change of value */
     void *data;
-    double slack; /* nothing below least - slack stays undiscovered */
+    double slack; /* nothing below least - slack stays undiscovered (plus a hundredth of |least|) */
     double tie;   /* a value replaces the least only if lower by more than this */
     double least, at;
     double finest; /* shortest step between two evaluations that was needed, in samples */

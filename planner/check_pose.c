@@ -19,6 +19,7 @@ typedef struct poses {
     double *x;         /* 3*joints: the pose */
     double *direction; /* 3*(links + posts): unit vectors, 0 where the ends coincide */
     double *size;      /* links + posts: lengths from the joints */
+    double *curve;     /* links: lengths from the schedule's curves */
     angle *link_post, *link_link;
 } poses;
 
@@ -36,9 +37,11 @@ static morph_status poses_create(const morph_record *r, morph_findings *f, poses
     p->x = morph_alloc((size_t)r->joints, 3 * sizeof(double));
     p->direction = morph_alloc(bars, 3 * sizeof(double));
     p->size = morph_alloc(bars, sizeof(double));
+    p->curve = morph_alloc((size_t)r->links, sizeof(double));
     p->link_post = morph_alloc((size_t)r->link_posts, sizeof(angle));
     p->link_link = morph_alloc((size_t)r->link_links, sizeof(angle));
-    if (!p->x || !p->direction || !p->size || !p->link_post || !p->link_link) return MORPH_ERR_NOMEM;
+    if (!p->x || !p->direction || !p->size || !p->curve || !p->link_post || !p->link_link)
+        return MORPH_ERR_NOMEM;
     /* Gates start closed: least > most. */
     for (int i = 0; i < r->link_posts; i++) {
         const int *t = r->link_post[i], joint = shared_joint(r->link[t[0]], r->post[t[1]]);
@@ -56,6 +59,7 @@ static void poses_free(poses *p) {
     free(p->x);
     free(p->direction);
     free(p->size);
+    free(p->curve);
     free(p->link_post);
     free(p->link_link);
 }
@@ -148,8 +152,9 @@ static void test_rest_of_pose(poses *p, int k, int i, double t) {
         morph_finding_note(&m[MORPH_MARGIN_POST_LENGTH], -error, t, morph_element_of(MORPH_ELEMENT_POST, j),
                            none);
     }
+    morph_check_curve_lengths(r, k, i, p->curve);
     for (int j = 0; j < r->links; j++) {
-        const double error = fabs(morph_check_curve_length(r, j, k, i) - p->size[j]);
+        const double error = fabs(p->curve[j] - p->size[j]);
         morph_finding_note(&m[MORPH_MARGIN_COMPATIBILITY], -error, t, morph_element_of(MORPH_ELEMENT_LINK, j),
                            none);
     }

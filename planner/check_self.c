@@ -194,7 +194,7 @@ static morph_status search(bars *s, const morph_control *control, double h, morp
                      0,
                      r->samples,
                      0,
-                     20000000 + 100000L * s->count,
+                     3000000 + 50000L * s->count,
                      false,
                      false};
     start_values(s, &w, m);
