@@ -62,7 +62,8 @@ static morph_status gap_walk(void *data, const double *x, const double *weight, 
         const morph_skin_sample *q = &d->cavity->sample[s];
         double at[3], g[3], h[6];
         sample_at(q, x, at);
-        const double gap = gap_at(d, at, g, second ? h : NULL), scale = sample_scale(d, q);
+        const double gap = gap_at(d, at, g, second && !d->gauss_newton ? h : NULL),
+                     scale = sample_scale(d, q);
         for (int a = 0; a < 3; a++)
             for (int k = 0; k < 3; k++) {
                 if (first)
@@ -71,9 +72,10 @@ static morph_status gap_walk(void *data, const double *x, const double *weight, 
                 for (int b = 0; b < 3 && second; b++)
                     for (int m = 0; m < 3; m++)
                         if (3 * q->joint[a] + k >= 3 * q->joint[b] + m)
-                            morph_sink_hessian(sink, 3 * q->joint[a] + k, 3 * q->joint[b] + m,
-                                               2.0 * weight[0] * scale * q->weight[a] * q->weight[b] *
-                                                   (g[k] * g[m] + gap * h[packed[k][m]]));
+                            morph_sink_hessian(
+                                sink, 3 * q->joint[a] + k, 3 * q->joint[b] + m,
+                                2.0 * weight[0] * scale * q->weight[a] * q->weight[b] *
+                                    (g[k] * g[m] + (d->gauss_newton ? 0.0 : gap * h[packed[k][m]])));
             }
     }
     return MORPH_OK;

@@ -95,9 +95,7 @@ static morph_status separation_value(void *data, const double *x, double *f) {
     const morph_separation_rows *rows = data;
     for (int r = 0; r < rows->count; r++) {
         const morph_pair *p = &rows->pair[r];
-        f[r] = 0.0;
-        for (int a = 0; a < 4; a++)
-            f[r] += p->weight[a] * morph_dot(p->normal, &x[3 * p->joint[a]]);
+        f[r] = morph_dot(p->normal, &x[3 * p->joint[0]]) - morph_dot(p->normal, &x[3 * p->joint[1]]);
     }
     return MORPH_OK;
 }
@@ -109,9 +107,10 @@ static morph_status separation_walk(void *data, const double *x, const double *w
     (void)weight;
     for (int r = 0; r < rows->count && morph_sink_wants_jacobian(sink); r++) {
         const morph_pair *p = &rows->pair[r];
-        for (int a = 0; a < 4; a++)
-            for (int k = 0; k < 3; k++)
-                morph_sink_jacobian(sink, r, 3 * p->joint[a] + k, p->weight[a] * p->normal[k]);
+        for (int k = 0; k < 3; k++) {
+            morph_sink_jacobian(sink, r, 3 * p->joint[0] + k, p->normal[k]);
+            morph_sink_jacobian(sink, r, 3 * p->joint[1] + k, -p->normal[k]);
+        }
     }
     return MORPH_OK;
 }

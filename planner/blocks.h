@@ -66,12 +66,11 @@ typedef struct morph_clearance_rows {
 morph_block morph_block_clearance(morph_clearance_rows *data, const int *unknown, double *lower,
                                   double *upper);
 
-/* Two axes (links or posts) kept apart at fixed parameters along a fixed unit normal: n.(P - Q) >= distance +
- * margin. At the closest points with n along P - Q this is the exact distance; a row keeps its side, so that
- * axes cannot pass through each other. */
+/* Ends of two axes (links or posts) kept apart along a fixed unit normal: n.(A - B) >= distance + margin.
+ * With all four such rows and n along the line of the axes' closest points the axes are apart by that much,
+ * and stay on their sides: they cannot pass through each other. */
 typedef struct morph_pair {
-    int joint[4];     /* a0, a1, b0, b1 */
-    double weight[4]; /* 1-s, s, -(1-t), -t */
+    int joint[2]; /* an end of the one, an end of the other */
     double normal[3];
     double distance; /* least distance allowed between the axes, spacings */
     int axis[2];     /* link number, or links + post number */
@@ -93,6 +92,8 @@ typedef struct morph_gap_term {
     const morph_sdf *sdf;
     double blend;
     double scale;
+    bool gauss_newton; /* leave the distance's second derivatives out of the Hessian: it is then positive
+                          semidefinite */
 } morph_gap_term;
 morph_block morph_block_gap(morph_gap_term *data, const int *unknown);
 

@@ -271,6 +271,16 @@ static void pair_name(examiner *e, int a, int b, double amount) {
     snprintf(v->element[MORPH_LIMIT_SELF], sizeof v->element[MORPH_LIMIT_SELF], "%s / %s", first, second);
 }
 
+static void add_pair(examiner *e, const morph_pair *pair) {
+    morph_active *a = e->active;
+    if (!grow((void **)&a->pair, &a->pair_capacity, a->pairs + 1, sizeof *pair)) {
+        e->status = MORPH_ERR_NOMEM;
+        return;
+    }
+    a->pair[a->pairs++] = *pair;
+    e->added++;
+}
+
 static void examine_pair(examiner *e, int a, int b) {
     const morph_structure *s = e->world->structure;
     int p[2], q[2];
@@ -284,23 +294,21 @@ static void examine_pair(examiner *e, int a, int b) {
         morph_segment_segment(&e->x[3 * p[0]], &e->x[3 * p[1]], &e->x[3 * q[0]], &e->x[3 * q[1]], &u, &v);
     pair_name(e, a, b, apart - d);
     if (!e->active || d > apart + e->inset->self + e->near->self) return;
-    morph_pair pair = {.joint = {p[0], p[1], q[0], q[1]},
-                       .weight = {1.0 - u, u, v - 1.0, -v},
-                       .distance = apart,
-                       .axis = {a, b}};
-    for (int k = 0; k < 3; k++)
-        for (int m = 0; m < 4; m++)
-            pair.normal[k] += pair.weight[m] * e->x[3 * pair.joint[m] + k];
-    /* Axes that cross have no side: the row would be made of rounding. The examination names them. */
+    /* Axes that cross have no side: the rows would be made of rounding. The examination names them. */
     if (d < 1e-6) return;
+    double normal[3];
     for (int k = 0; k < 3; k++)
-        pair.normal[k] /= d;
-    if (!grow((void **)&e->active->pair, &e->active->pair_capacity, e->active->pairs + 1, sizeof pair)) {
-        e->status = MORPH_ERR_NOMEM;
-        return;
-    }
-    e->active->pair[e->active->pairs++] = pair;
-    e->added++;
+        normal[k] = ((1.0 - u) * e->x[3 * p[0] + k] + u * e->x[3 * p[1] + k] -
+                     (1.0 - v) * e->x[3 * q[0] + k] - v * e->x[3 * q[1] + k]) /
+                    d;
+    /* Two convex bodies are apart by d along the line of their closest points if all their corners are: one
+     * row for each two ends. */
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            add_pair(e, &(morph_pair){.joint = {p[i], q[j]},
+                                      .distance = apart,
+                                      .axis = {a, b},
+                                      .normal = {normal[0], normal[1], normal[2]}});
 }
 
 typedef struct span {

@@ -112,7 +112,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     if (count < 0) return MORPH_ERR_NOMEM;
     /* The kink between target and base plane is rounded over a tenth of a spacing: the width of a link and
      * its gap. */
-    morph_gap_term gap = {r->world->cavity, r->world->sdf, 0.1, 1.0};
+    morph_gap_term gap = {r->world->cavity, r->world->sdf, 0.1, 1.0, getenv("GN") != NULL};
     morph_cover_term cover = {r->world->cavity, (const int(*)[3])r->cover_joint,
                               (const double(*)[3])r->cover_weight, r->options->slide,
                               r->options->cover_weight};
@@ -143,7 +143,11 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
      * of area times gap^2), so 1e-5 in its gradient moves the gap by far less than a thousandth of a spacing.
      */
     o.tolerance = round < 2 ? 1e-4 : 1e-5;
-    o.max_iterations = 150;
+    o.max_iterations = getenv("MAXIT") ? atoi(getenv("MAXIT")) : 150;
+    if (getenv("MONO")) {
+        o.adaptive_mu = false;
+        o.mu_init = atof(getenv("MONO"));
+    }
     o.mu_init = round == 0 ? 1e-2 : 1e-4;
     o.control = &r->quiet;
     if (r->options->seconds > 0.0)
@@ -168,8 +172,10 @@ static void tally(refiner *r, const morph_nlp_result *result) {
  * that, an angle turns by that over a length; most moves are far smaller, and what is missed shows in the
  * next examination. */
 static morph_status examine(refiner *r, morph_violation *v) {
-    const morph_nearness near = {
-        .length = r->reach, .angle = r->reach, .clearance = r->reach, .self = r->reach};
+    const morph_nearness near = {.length = 2.0 * r->reach,
+                                 .angle = 2.5 * r->reach,
+                                 .clearance = 1.2 * r->reach,
+                                 .self = 2.0 * r->reach};
     morph_active_clear(r->active, r->world->structure);
     return morph_pose_examine(r->world, r->x, &r->options->inset, &near, r->active, NULL, v);
 }
