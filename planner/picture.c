@@ -209,8 +209,11 @@ static morph_status draw_panel(cairo_t *c, const morph_record *r, int panel, con
         morph_bounds bounds = morph_bounds_empty();
         const morph_motion *ends[] = {&nominal, &m};
         for (int k = 0; k < 2; k++)
-            if (ends[k]->frames > 0)
-                morph_bounds_add(&bounds, &view, joints_at(r, ends[k], ends[k]->frames - 1), r->joints, NULL);
+            if (ends[k]->frames > 0) {
+                const double *joints = joints_at(r, ends[k], ends[k]->frames - 1);
+                morph_bounds_add(&bounds, &view, joints, r->joints, NULL);
+                add_ground(r, joints, &view, &bounds);
+            }
         morph_bounds_add(&bounds, &view, r->target_v, r->target_vertices, NULL);
         room = (morph_box){box->x + 10, box->y + 10, box->width - 20, box->height - 20};
         morph_view_fit(&view, &bounds, &room);

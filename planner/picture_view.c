@@ -159,7 +159,8 @@ static void draw_skin(const scene_view *s, int index) {
     for (int k = 0; k < 3; k++)
         for (int d = 0; d < 3; d++)
             middle[d] += s->at[3 * (size_t)t[k] + (size_t)d] / 3;
-    if (!shows(s, middle)) return;
+    /* Skin lies on the target, and its triangles may dip in: hidden is only what is well behind. */
+    if (!morph_relief_shows(s->relief, s->view, s->offset, middle, 0.3 * s->record->spacing)) return;
     for (int k = 0; k < 3; k++)
         cairo_line_to(s->c, s->at[3 * (size_t)t[k]], s->at[3 * (size_t)t[k] + 1]);
     cairo_close_path(s->c);

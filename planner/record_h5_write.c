@@ -117,7 +117,7 @@ static bool put_all(hid_t file, const morph_record *record) {
 /* An empty file in memory. Superblock and object headers of version 2 and later carry checksums, so that a
  * damaged file is recognised; every HDF5 since 1.8 reads them. */
 static hid_t create_image(hid_t access, hid_t plain) {
-    const size_t growth = (size_t)8 << 20;
+    const size_t growth = (size_t)1 << 20;
     if (access < 0 || plain < 0 || H5Pset_fapl_core(access, growth, false) < 0 ||
         H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18) < 0 ||
         H5Pset_obj_track_times(plain, false) < 0)
