@@ -66,6 +66,23 @@ typedef struct morph_clearance_rows {
 morph_block morph_block_clearance(morph_clearance_rows *data, const int *unknown, double *lower,
                                   double *upper);
 
+/* A feature of the target under an element of the structure (see block_feature.c), all in spacings. */
+typedef struct morph_feature {
+    int joint[3]; /* a, b, c; of a link a, b, b */
+    bool is_edge;
+    double point[3]; /* y, on the target */
+    double edge[3];  /* its direction */
+    double sign;     /* makes the distance positive on the outer side */
+} morph_feature;
+typedef struct morph_feature_rows {
+    const morph_structure *structure;
+    int count;
+    const morph_feature *feature;
+    double margin;
+} morph_feature_rows;
+morph_block morph_block_features(morph_feature_rows *data, const int *unknown, double *lower, double *upper);
+double morph_feature_at(const morph_feature *feature, const double *x);
+
 /* Ends of two axes (links or posts) kept apart along a fixed unit normal: n.(A - B) >= distance + margin.
  * With all four such rows and n along the line of the axes' closest points the axes are apart by that much,
  * and stay on their sides: they cannot pass through each other. */

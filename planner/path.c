@@ -2,7 +2,7 @@
  * its limits (with an inset) ask; a spline goes through them; where it breaks a limit between poses, a pose
  * is inserted and the spline drawn anew. */
 #include "planner/path.h"
-#include "planner/refine.h"
+#include "planner/project.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -26,9 +26,8 @@ typedef struct pather {
     double *x;      /* capacity x coordinates, scaled */
     double *inset;  /* capacity: extra factor on the inset of a pose */
     double *metres; /* capacity x coordinates */
-    double *lower;
+    morph_active *active;
     double started;
-    morph_control quiet; /* the caller's control without its log */
 } pather;
 
 static double *pose(pather *p, int k) {
@@ -83,62 +82,12 @@ static morph_inset inset_at(const pather *p, double s, double factor) {
                          e->clearance + f * (i->clearance - e->clearance), e->self + f * (i->self - e->self)};
 }
 
-static morph_status solve_once(pather *p, double *x, const double *reference, const morph_inset *inset,
-                               morph_active *active, morph_nlp_result *result) {
-    morph_block blocks[MORPH_POSE_BLOCKS + 1];
-    int count = morph_active_blocks(active, p->world, NULL, inset, blocks);
-    if (count < 0) return MORPH_ERR_NOMEM;
-    morph_near_term near = {p->coordinates, reference, 1.0};
-    blocks[count++] = morph_block_near(&near, NULL);
-    morph_nlp *nlp = NULL;
-    morph_status status = morph_nlp_create(p->coordinates, x, p->lower, NULL, blocks, count, NULL, 0, &nlp);
-    if (status != MORPH_OK) return status;
-    morph_nlp_options o = morph_nlp_defaults();
-    o.tolerance = 1e-5; /* of an objective in spacings^2: moves no joint by a hundredth of a link's radius */
-    o.max_iterations = 80;
-    o.mu_init = 1e-2;
-    o.control = &p->quiet;
-    status = morph_nlp_solve(nlp, x, &o, result);
-    morph_nlp_destroy(nlp);
-    if (status != MORPH_OK) return status;
-    p->report->solves++;
-    p->report->iterations += result->iterations;
-    p->report->linear_seconds += result->linear_seconds;
-    p->report->callback_seconds += result->callback_seconds;
-    p->report->unknowns = result->unknowns;
-    if (result->rows > p->report->rows_used) p->report->rows_used = result->rows;
-    memcpy(x, result->x, (size_t)p->coordinates * sizeof *x);
-    return MORPH_OK;
-}
-
 /* Moves pose k the least from where it stands so that it holds its limits with its inset. */
 static morph_status solve_pose(pather *p, int k) {
     const morph_inset inset = inset_at(p, p->s[k], p->inset[k]);
-    /* Rows enter well before their limits: a pose moves little. */
-    const morph_nearness near = {.length = 0.05, .angle = 0.08, .clearance = 0.1, .self = 0.05};
-    morph_active *active = NULL;
-    double *reference = morph_alloc((size_t)p->coordinates, sizeof(double));
-    morph_status status = reference ? morph_active_create(p->world->structure, &active) : MORPH_ERR_NOMEM;
     morph_violation v;
-    if (status == MORPH_OK) {
-        memcpy(reference, pose(p, k), (size_t)p->coordinates * sizeof *reference);
-        morph_pose_bounds(p->world, inset.clearance, p->lower);
-        status = morph_pose_examine(p->world, pose(p, k), &inset, &near, active, NULL, &v);
-    }
-    for (int round = 0; round < 5 && status == MORPH_OK; round++) {
-        morph_nlp_result result = {0};
-        status = solve_once(p, pose(p, k), reference, &inset, active, &result);
-        if (status != MORPH_OK) break;
-        int added = 0;
-        status = morph_pose_examine(p->world, pose(p, k), &inset, &near, active, &added, &v);
-        const double worst = morph_violation_worst(&v, morph_pose_tolerance, NULL);
-        const int solved = result.outcome == MORPH_OPTIMAL || result.outcome == MORPH_FEASIBLE;
-        morph_nlp_result_free(&result);
-        if (worst <= 1.0 && (solved || round > 0)) break;
-    }
-    morph_active_destroy(active);
-    free(reference);
-    return status;
+    return morph_project(p->world, &inset, 5, p->options->control, p->active, pose(p, k), &v,
+                         &p->report->effort);
 }
 
 /* Parameter by chord length, so that the spline sees even speed. */
@@ -304,10 +253,9 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     p.x = morph_alloc(rows * width, sizeof(double));
     p.inset = morph_alloc(rows, sizeof(double));
     p.metres = morph_alloc(rows * width, sizeof(double));
-    p.lower = morph_alloc(width, sizeof(double));
-    morph_status status = p.s && p.x && p.inset && p.metres && p.lower ? MORPH_OK : MORPH_ERR_NOMEM;
-    if (options->control) p.quiet = *options->control;
-    p.quiet.log = NULL;
+    morph_status status = p.s && p.x && p.inset && p.metres ? MORPH_OK : MORPH_ERR_NOMEM;
+    if (status == MORPH_OK)
+        status = morph_active_create(world->structure, &p.active);
     if (status == MORPH_OK) {
         set_guided_poses(&p, guide, start, end);
         status = run(&p, out);
@@ -318,6 +266,6 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     free(p.x);
     free(p.inset);
     free(p.metres);
-    free(p.lower);
+    morph_active_destroy(p.active);
     return status;
 }

@@ -5,7 +5,7 @@
 
 #include "model/blanket.h"
 #include "planner/curve.h"
-#include "planner/pose.h"
+#include "planner/project.h"
 
 typedef struct morph_path_options {
     morph_inset end;      /* the inset that the end pose was solved with */
@@ -19,9 +19,9 @@ typedef struct morph_path_options {
 morph_path_options morph_path_defaults(void);
 
 typedef struct morph_path_report {
-    int poses, inserted, solves, iterations;
-    int unknowns, rows_used, rows_possible; /* of the largest solve */
-    double linear_seconds, callback_seconds, seconds;
+    int poses, inserted, rows_possible;
+    morph_effort effort;
+    double seconds;
     bool feasible;              /* on the fine grid, by exact examination */
     morph_violation violation;  /* worst over the fine grid */
     double where[MORPH_LIMITS]; /* parameter of each */

@@ -82,12 +82,12 @@ static morph_status stage_refine(planner *p) {
         status = MORPH_OK;
     }
     morph_summary *s = &p->plan->summary;
-    s->iterations_refine = r.iterations;
-    s->unknowns_refine = r.unknowns;
-    s->rows_refine_used = r.rows_used;
+    s->iterations_refine = r.effort.iterations;
+    s->unknowns_refine = r.effort.unknowns;
+    s->rows_refine_used = r.effort.rows;
     s->rows_refine_possible = r.rows_possible;
-    s->linear_seconds += r.linear_seconds;
-    s->callback_seconds += r.callback_seconds;
+    s->linear_seconds += r.effort.linear_seconds;
+    s->callback_seconds += r.effort.callback_seconds;
     p->optimal = p->optimal && r.last == MORPH_OPTIMAL;
     note_time(p, MORPH_STAGE_REFINE, since);
     return status;
@@ -111,12 +111,12 @@ static morph_status stage_path(planner *p) {
         p->stopped = true;
     }
     morph_summary *s = &p->plan->summary;
-    s->iterations_path = r.iterations;
-    s->unknowns_path = r.unknowns;
-    s->rows_path_used = r.rows_used;
+    s->iterations_path = r.effort.iterations;
+    s->unknowns_path = r.effort.unknowns;
+    s->rows_path_used = r.effort.rows;
     s->rows_path_possible = r.rows_possible;
-    s->linear_seconds += r.linear_seconds;
-    s->callback_seconds += r.callback_seconds;
+    s->linear_seconds += r.effort.linear_seconds;
+    s->callback_seconds += r.effort.callback_seconds;
     note_time(p, MORPH_STAGE_PATH, since);
     return status;
 }

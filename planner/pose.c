@@ -185,6 +185,30 @@ static void add_point(examiner *e, const int *joint, const double *weight, int n
     e->added++;
 }
 
+/* Points of a triangle where the target comes closer than its corners tell (an edge or a corner of the target
+ * beneath it): between them the element could move into the target unseen within one solve. Nine points leave
+ * no more than a quarter of the triangle unseen. */
+static void add_samples(examiner *e, const int *joint, double reach) {
+    static const double weights[9][3] = {{0.5, 0.5, 0.0},   {0.0, 0.5, 0.5},   {0.5, 0.0, 0.5},
+                                         {0.6, 0.2, 0.2},   {0.2, 0.6, 0.2},   {0.2, 0.2, 0.6},
+                                         {0.75, 0.25, 0.0}, {0.0, 0.75, 0.25}, {0.25, 0.0, 0.75}};
+    const double a = e->world->structure->spacing;
+    double corner[3];
+    for (int i = 0; i < 3; i++)
+        corner[i] = morph_sdf_eval(e->world->sdf, &e->metres[3 * joint[i]], NULL, NULL) / a;
+    for (int q = 0; q < 9; q++) {
+        double at[3] = {0.0, 0.0, 0.0}, even = 0.0;
+        for (int i = 0; i < 3; i++) {
+            even += weights[q][i] * corner[i];
+            for (int k = 0; k < 3; k++)
+                at[k] += weights[q][i] * e->metres[3 * joint[i] + k];
+        }
+        const double distance = morph_sdf_eval(e->world->sdf, at, NULL, NULL) / a;
+        /* A fiftieth of a spacing: half a link's radius. */
+        if (distance < reach && distance < even - 0.02) add_point(e, joint, weights[q], 3, 0.05);
+    }
+}
+
 static void skin_name(const morph_structure *s, int t, char *text, size_t size) {
     const int *n = s->joint_node[s->skin[t][0]];
     snprintf(text, size, "skin triangle %d at (%d,%d)", t, n[0], n[1]);
@@ -222,6 +246,7 @@ static void examine_element(examiner *e, const int *joint, int n, int element) {
         morph_distance_point_bounded(e->world->exact, &e->metres[3 * joint[i]], reach * a, &v);
         if (v.distance < reach * a) add_point(e, &joint[i], &one, 1, 0.5);
     }
+    if (n == 3) add_samples(e, joint, reach);
     /* A violated deepest point needs its own row unless one stands within a fraction of the radius (over
      * which the clearance of a link across an edge changes little); an inside one only where nothing stands
      * near. */

@@ -39,17 +39,19 @@ typedef struct morph_violation {
 
 /* Rows of one pose. Examinations add to them; pairs are measured anew each time. */
 typedef struct morph_active {
-    int links, tuples, points, pairs;
+    int links, tuples, points, features, pairs;
     int *link, *tuple; /* capacity: all of them */
     bool *has_link, *has_tuple;
     morph_point *point;
+    morph_feature *feature;
     morph_pair *pair;
-    int point_capacity, pair_capacity;
+    int point_capacity, feature_capacity, pair_capacity;
     /* Storage of the blocks: data and bounds, rebuilt by morph_active_blocks. */
     morph_post_rows post_rows;
     morph_length_rows length_rows;
     morph_angle_rows angle_rows;
     morph_clearance_rows clearance_rows;
+    morph_feature_rows feature_rows;
     morph_separation_rows separation_rows;
     double *lower, *upper;
     int bound_capacity;
@@ -71,10 +73,10 @@ morph_status morph_pose_examine(const morph_world *world, const double *x, const
                                 const morph_nearness *near, morph_active *active, int *added,
                                 morph_violation *violation);
 
-/* Fills out with the constraint blocks that have rows (of posts, lengths, angles, clearance, separation) and
- * returns their number. `unknown` as in blocks.h. The blocks refer to storage in *active and stand until the
- * next call. -1 if memory is refused. */
-enum { MORPH_POSE_BLOCKS = 5 };
+/* Fills out with the constraint blocks that have rows (of posts, lengths, angles, clearance, features,
+ * separation) and returns their number. `unknown` as in blocks.h. The blocks refer to storage in *active and
+ * stand until the next call. -1 if memory is refused. */
+enum { MORPH_POSE_BLOCKS = 6 };
 int morph_active_blocks(morph_active *active, const morph_world *world, const int *unknown,
                         const morph_inset *inset, morph_block out[MORPH_POSE_BLOCKS]);
 

@@ -6,20 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Posts: the check allows 1e-6. Length, angle, base: the check allows rounding only, so no more than Ipopt's
- * own convergence (1e-8 in scaled rows) may be spent of the inset. Clearance: the check allows 1e-3 spacing.
- */
-const double morph_pose_tolerance[MORPH_LIMITS] = {
-    [MORPH_LIMIT_POST] = 5e-7,      [MORPH_LIMIT_LENGTH] = 1e-9, [MORPH_LIMIT_ANGLE] = 1e-9,
-    [MORPH_LIMIT_CLEARANCE] = 5e-4, [MORPH_LIMIT_BASE] = 1e-9,   [MORPH_LIMIT_SELF] = 1e-9};
-
 morph_refine_options morph_refine_defaults(void) {
     /* The insets leave room for the path's spline to approach the end from inside: a thousandth of a spacing,
      * and of a radian, changes the reachable shape by less than the links' radius. */
     return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 1e-3, .self = 1e-3},
                                   .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.1,
-                                  .reach = 0.4,
+                                  .reach = 0.3,
+                                  .least_reach = 0.03,
                                   .hold = 1e-3,
                                   .rounds = 12};
 }
@@ -149,6 +143,10 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
         o.mu_init = atof(getenv("MONO"));
     }
     o.mu_init = round == 0 ? 1e-2 : 1e-4;
+    if (getenv("MONO")) {
+        o.adaptive_mu = false;
+        o.mu_init = atof(getenv("MONO"));
+    }
     o.control = &r->quiet;
     if (r->options->seconds > 0.0)
         o.max_seconds = fmax(0.1, r->options->seconds - (morph_seconds() - r->started));
@@ -157,60 +155,67 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     return status;
 }
 
-static void tally(refiner *r, const morph_nlp_result *result) {
-    morph_refine_report *p = r->report;
-    p->rounds++;
-    p->iterations += result->iterations;
-    p->unknowns = result->unknowns;
-    p->rows_used = morph_active_rows(r->active, r->world->structure);
-    p->linear_seconds += result->linear_seconds;
-    p->callback_seconds += result->callback_seconds;
-    p->last = result->outcome;
-}
-
-/* Rows for a round: all that a move of `reach` can bring to their limits. Two ends move apart by up to twice
- * that, an angle turns by that over a length; most moves are far smaller, and what is missed shows in the
- * next examination. */
-static morph_status examine(refiner *r, morph_violation *v) {
-    const morph_nearness near = {.length = 2.0 * r->reach,
-                                 .angle = 2.5 * r->reach,
-                                 .clearance = 1.2 * r->reach,
-                                 .self = 2.0 * r->reach};
+/* Rows for a solve: all that a move of `reach` is likely to bring to their limits; what is missed shows in
+ * the examination after it. */
+static morph_status choose_rows(refiner *r, morph_violation *v) {
+    const double m = r->reach;
+    const morph_nearness near = {.length = 2.0 * m, .angle = 2.5 * m, .clearance = 1.2 * m, .self = 0.6 * m};
     morph_active_clear(r->active, r->world->structure);
     return morph_pose_examine(r->world, r->x, &r->options->inset, &near, r->active, NULL, v);
 }
 
+/* One round from the feasible r->x: a solve within reach, its result moved inside the limits, and kept if it
+ * is better. */
+static morph_status improve(refiner *r, int round, double *objective) {
+    const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
+    morph_violation v;
+    morph_nlp_result result = {0};
+    morph_status status = choose_rows(r, &v);
+    if (status == MORPH_OK) status = solve_round(r, round, &result);
+    if (status != MORPH_OK) return status;
+    morph_effort_add(&r->report->effort, &result);
+    r->report->last = result.outcome;
+    memcpy(r->x, result.x, bytes);
+    status = morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
+                           &r->report->effort);
+    if (status == MORPH_OK) status = consider(r, r->x, &v, objective);
+    morph_limit which = MORPH_LIMIT_POST;
+    morph_violation_worst(&v, morph_pose_tolerance, &which);
+    morph_log(
+        r->options->control,
+        "refine: round %d: reach %.2f, %s, %d iterations, %d rows, %.2f s; objective %.5g, worst %s %.2g",
+        round + 1, r->reach, morph_outcome_text(result.outcome), result.iterations, result.rows,
+        result.seconds, *objective, morph_limit_name(which), v.amount[which]);
+    morph_nlp_result_free(&result);
+    return status;
+}
+
 static morph_status rounds(refiner *r) {
     const morph_refine_options *o = r->options;
+    const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
     morph_violation v;
-    double objective, before = INFINITY;
-    r->reach = o->reach;
-    morph_status status = examine(r, &v);
+    double objective;
+    /* The start: the blanket, moved inside the limits. */
+    morph_status status =
+        morph_project(r->world, &o->inset, 8, o->control, r->active, r->x, &v, &r->report->effort);
     if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
-    for (int round = 0; round < o->rounds && status == MORPH_OK; round++) {
-        morph_nlp_result result = {0};
-        status = solve_round(r, round, &result);
-        if (status != MORPH_OK) break;
-        tally(r, &result);
-        memcpy(r->x, result.x, 3 * (size_t)r->world->structure->joints * sizeof *r->x);
-        r->reach = fmax(0.75 * r->reach, 0.05);
-        status = examine(r, &v);
-        if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
-        morph_limit which = MORPH_LIMIT_POST;
-        const double worst = morph_violation_worst(&v, morph_pose_tolerance, &which);
-        morph_log(o->control,
-                  "refine: round %d: %s after %d iterations (%s), %.2f s, objective %.6g, worst %s %.3g "
-                  "(%s), %d rows",
-                  round + 1, morph_outcome_text(result.outcome), result.iterations, result.solver_text,
-                  result.seconds, objective, morph_limit_name(which), v.amount[which], v.element[which],
-                  result.rows);
-        morph_nlp_result_free(&result);
+    r->reach = o->reach;
+    int small_gains = 0;
+    for (int round = 0;
+         round < o->rounds && status == MORPH_OK && small_gains < 2 && r->reach > o->least_reach; round++) {
+        const bool was_feasible = r->best_feasible;
+        const double before = r->best_objective;
+        status = improve(r, round, &objective);
+        r->report->rounds = round + 1;
+        const double gain = was_feasible ? before - r->best_objective : r->best_feasible ? before : 0.0;
+        /* Trust region: a round that did not help was too bold. */
+        r->reach *= gain > 0.0 ? 1.25 : 0.5;
+        r->reach = fmin(r->reach, o->reach);
+        small_gains = gain > 0.01 * before ? 0 : small_gains + (gain > 0.0);
+        memcpy(r->x, r->best, bytes);
         morph_progress(o->control, "refine", (round + 1.0) / o->rounds);
         if (morph_stopped(o->control)) status = MORPH_ERR_STOPPED;
         if (o->seconds > 0.0 && morph_seconds() - r->started > o->seconds) break;
-        /* Settled: inside every limit, and a round gained less than a per cent. */
-        if (worst <= 1.0 && objective > 0.99 * before) break;
-        before = objective;
     }
     return status;
 }

@@ -3,13 +3,14 @@
 #ifndef MORPH_REFINE_H
 #define MORPH_REFINE_H
 
-#include "planner/pose.h"
+#include "planner/project.h"
 
 typedef struct morph_refine_options {
     morph_inset inset;
     double cover_weight; /* w_c */
     double slide;        /* pull across the target's normal, relative to along it */
     double reach;        /* how far a joint may move in one round, spacings: rows are chosen for that reach */
+    double least_reach;  /* below this it is settled */
     double hold;         /* weight that keeps free joints where they stand */
     int rounds;          /* solves, at most */
     double seconds;      /* wall; <= 0: none */
@@ -18,18 +19,14 @@ typedef struct morph_refine_options {
 morph_refine_options morph_refine_defaults(void);
 
 typedef struct morph_refine_report {
-    int rounds, iterations;
-    int unknowns, rows_used, rows_possible;
+    int rounds, rows_possible;
+    morph_effort effort; /* of all solves */
     int jacobian_nonzeros, hessian_nonzeros;
-    double linear_seconds, callback_seconds, seconds;
+    double seconds;
     bool feasible;             /* by the exact examination of the returned pose, inset not counted */
     morph_violation violation; /* of the returned pose */
     morph_outcome last;        /* what the last solve concluded */
 } morph_refine_report;
-
-/* How far a pose may be beyond its limits and still count as inside: relative (posts), spacings, radians. The
- * check's own tolerances, or tighter. */
-extern const double morph_pose_tolerance[MORPH_LIMITS];
 
 /* x (3*joints, metres) is start and result: the feasible pose with the least cavity objective that was found,
  * the start included; where none is feasible, the least violating one. MORPH_ERR_STOPPED leaves the best so
