@@ -7,7 +7,7 @@
 /* At rest: for REST_WINDOW sqrt(spacing / gravity), the time a joint takes to fall half a spacing four times
  * over, no joint is faster than REST_SPEED sqrt(gravity spacing): it would then creep less than 1e-2 spacings
  * in that window, far below the gaps (0.1 spacings and more) that the end pose is judged by. */
-#define REST_SPEED 2.5e-3
+#define REST_SPEED 5e-3
 #define REST_WINDOW 4.0
 /* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
  * joint moves 0.06 spacings per step; contacts are listed to that distance. */
@@ -39,8 +39,7 @@ static morph_status trajectory_create(morph_trajectory *t, int capacity, int joi
 static void record(morph_blanket_state *b, double time, morph_trajectory *t, morph_blanket_report *report) {
     double *x = &t->x[(size_t)t->frames * 3 * (size_t)b->joints];
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));
-    morph_blanket_polish(b, x);
-    const morph_violation worst = morph_blanket_violation(b, x);
+    const morph_violation worst = morph_blanket_polish(b, x);
     report->worst_length = fmax(report->worst_length, worst.length);
     report->worst_post = fmax(report->worst_post, worst.post);
     report->worst_clearance = fmax(report->worst_clearance, worst.clearance);
@@ -79,7 +78,7 @@ static morph_status next_frame(morph_blanket_state *b, int *steps, morph_blanket
         memcpy(b->x, b->keep_x, bytes);
         memcpy(b->v, b->keep_v, bytes);
         morph_blanket_accelerations(b);
-        morph_blanket_wake(b);
+        morph_blanket_forget(b);
         *steps *= 2;
         report->step_halvings++;
     }
@@ -99,6 +98,14 @@ static int steps_per_frame(const morph_structure *s, const morph_blanket_def *de
     return steps <= MOST_STEPS ? (int)fmax(steps, 1.0) : 0;
 }
 
+/* Mean over the frame of the fastest joint: a contact's trembling within it is no motion. */
+static double frame_speed(const morph_blanket_state *b) {
+    double most = 0.0;
+    for (int j = 0; j < b->joints; j++)
+        most = fmax(most, morph_dist(&b->x[3 * j], &b->keep_x[3 * j]));
+    return most / b->def.frame;
+}
+
 static morph_status run(morph_blanket_state *b, int frames, const morph_control *control, morph_trajectory *t,
                         morph_blanket_report *report) {
     const morph_structure *s = b->structure;
@@ -111,10 +118,9 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     record(b, 0.0, t, report);
     while (t->frames < frames) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
-        const double path = b->path;
         const morph_status status = next_frame(b, &steps, report);
         if (status != MORPH_OK) return status;
-        report->rest_speed = (b->path - path) / b->def.frame;
+        report->rest_speed = frame_speed(b);
         record(b, t->frames * b->def.frame, t, report);
         morph_progress(control, "nominal", (double)t->frames / frames);
         calm = report->rest_speed <= speed ? calm + b->def.frame : 0.0;
