@@ -138,8 +138,9 @@ static void start_length(morph_blanket_state *b, int l, double *x, double warm, 
 
 /* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
  * su dc/du + sv dc/dv. Returns the sum of the gradients' squares; 0 where the arms are parallel, which the
- * limits keep far from. grad may be NULL. */
-static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3]) {
+ * limits keep far from. arm: the shorter arm's length. grad may be
+ * NULL, then so may arm, and 0 is returned. */
+static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
     double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
     for (int j = 0; j < a->joints; j++)
         for (int k = 0; k < 3; k++) {
@@ -149,6 +150,7 @@ static double cosine(const morph_angle *a, const double *x, double *c, double (*
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
     if (!grad || !(scale > 0.0)) return 0.0;
+    *arm = sqrt(fmin(uu, vv));
     double square = 0.0;
     for (int j = 0; j < a->joints; j++) {
         for (int k = 0; k < 3; k++)
@@ -161,8 +163,12 @@ static double cosine(const morph_angle *a, const double *x, double *c, double (*
 
 double morph_blanket_cosine(const morph_angle *a, const double *x) {
     double c;
-    cosine(a, x, &c, NULL);
+    cosine(a, x, &c, NULL, NULL);
     return c;
+}
+
+static double clip(double value, double most) {
+    return fmax(-most, fmin(most, value));
 }
 
 static void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
@@ -171,21 +177,24 @@ static void turn(const morph_angle *a, double *x, const double (*grad)[3], doubl
             x[3 * a->joint[j] + k] += change * grad[j][k];
 }
 
+/* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
+ * the shorter arm. */
 static void project_angle(morph_angle *a, double *x) {
-    double c, grad[4][3];
-    cosine(a, x, &c, NULL);
+    double c, arm, grad[4][3];
+    cosine(a, x, &c, NULL, NULL);
     if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return;
-    const double square = cosine(a, x, &c, grad);
+    const double square = cosine(a, x, &c, grad, &arm);
     if (square == 0.0) return;
-    double change = unilateral(&a->push[0], (c - a->floor) / square);
-    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], (a->ceiling - c) / square);
+    const double most = 0.5 * arm / sqrt(square);
+    double change = unilateral(&a->push[0], clip((c - a->floor) / square, most));
+    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) / square, most));
     turn(a, x, (const double(*)[3])grad, change);
 }
 
 static void start_angle(morph_angle *a, double *x, double warm, double most) {
-    double c, grad[4][3];
+    double c, arm, grad[4][3];
     if (a->push[0] == a->push[1]) return;
-    const double square = cosine(a, x, &c, grad);
+    const double square = cosine(a, x, &c, grad, &arm);
     const double limit = square > 0.0 ? most / sqrt(square) : 0.0;
     a->push[0] = fmin(warm * a->push[0], limit);
     a->push[1] = fmin(warm * a->push[1], limit);

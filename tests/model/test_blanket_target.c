@@ -239,7 +239,6 @@ static void test_sphere(void **state) {
         s = (scene){0};
         make_sphere(&s.mesh, 0.21);
         make_scene(&s, 8, soft ? 50.0 : 200.0, 10);
-        if (soft) s.def.time = 2.0;
         drop(&s, soft ? "sphere 8 x 8, soft" : "sphere 8 x 8", soft ? 0.2 : 0.28, !soft);
         free_scene(&s);
     }
