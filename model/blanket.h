@@ -36,9 +36,12 @@ typedef struct morph_blanket_report {
     double seconds;
 } morph_blanket_report;
 
-/* Runs from x0 (3*joints, at rest). Contact uses `sdf`; `exact` may be NULL or is used to polish recorded
- * frames. On MORPH_ERR_STOPPED the frames so far are in *out. MORPH_ERR_NONFINITE if the motion cannot be
- * kept finite. */
+/* Runs from x0 (3*joints, at rest; first brought within limits where it is not). Contact uses `sdf` (NULL: no
+ * target). `exact` may be NULL or is used to polish recorded frames, and then to measure worst_clearance; it
+ * does not change the motion. report may be NULL. On MORPH_ERR_STOPPED the frames so far are in *out; on any
+ * other failure *out is empty. MORPH_ERR_NONFINITE if x0 is not finite or the motion cannot be kept from
+ * growing without cause; MORPH_ERR_INPUT for a negative or non-finite def, or more than 1e6 frames or steps a
+ * frame. */
 morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf *sdf,
                                const morph_distance *exact, const morph_blanket_def *def, const double *x0,
                                const morph_control *control, morph_trajectory *out,

@@ -11,7 +11,7 @@
  * direction to trust with a full correction. */
 #define LEAST_SLOPE 0.3
 /* Slope that the smooth distance does not exceed: 1 but for the spline's overshoot beside edges. */
-#define MOST_SLOPE 1.3
+#define MOST_SLOPE 2.0
 /* Search for the deepest place: strides in barycentric weight. */
 #define LONGEST_STRIDE 0.25
 #define SHORTEST_STRIDE 0.01
@@ -42,7 +42,9 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     const size_t most = (size_t)s->joints + 4 * (size_t)s->links + 5 * (size_t)s->skin_triangles;
     b->touch = morph_alloc(most, sizeof *b->touch);
     b->contact = morph_alloc(most + (size_t)s->joints, sizeof *b->contact);
-    if (!b->touch || !b->contact) return MORPH_ERR_NOMEM;
+    b->hold = morph_alloc(most + (size_t)s->joints, sizeof *b->hold);
+    b->spare_touch = morph_alloc(most, sizeof *b->spare_touch);
+    if (!b->touch || !b->contact || !b->hold || !b->spare_touch) return MORPH_ERR_NOMEM;
     if (!b->sdf) return MORPH_OK;
     for (int j = 0; j < s->joints; j++)
         add_touch(b, &j, 1, &whole, s->def.radius);
@@ -114,11 +116,12 @@ static bool set_plane(const morph_blanket_state *b, morph_contact *c, const doub
     return true;
 }
 
-static morph_contact *add_contact(morph_blanket_state *b, const int *joint, int corners,
-                                  const double *weight) {
+static morph_contact *add_contact(morph_blanket_state *b, const int *joint, int corners, const double *weight,
+                                  int source) {
     morph_contact *c = &b->contact[b->contacts];
     memset(c, 0, sizeof *c);
     c->corners = corners;
+    c->source = source;
     double sum = 0.0;
     for (int k = 0; k < corners; k++) {
         c->joint[k] = joint[k];
@@ -144,7 +147,7 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     }
     if (t->stride > 0.0) gap = seek(b, t, x, gap + t->radius) - t->radius;
     if (gap > near) return;
-    morph_contact *c = add_contact(b, t->joint, t->corners, t->weight);
+    morph_contact *c = add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
     if (set_plane(b, c, x, t->radius)) b->contacts++;
 }
 
@@ -154,7 +157,7 @@ static void find_base(morph_blanket_state *b, const double *x, double move) {
     const double radius = b->structure->def.radius, near = NEAR * b->structure->spacing + move;
     for (int j = 0; j < b->joints; j++) {
         if (x[3 * j + 2] > b->def.base + radius + near) continue;
-        morph_contact *c = add_contact(b, &j, 1, &whole);
+        morph_contact *c = add_contact(b, &j, 1, &whole, b->touches + j);
         c->normal[2] = 1.0;
         c->level = b->def.base + radius + CONTACT_MARGIN * b->structure->spacing;
         c->radius = -1.0;
@@ -162,9 +165,13 @@ static void find_base(morph_blanket_state *b, const double *x, double move) {
     }
 }
 
-void morph_blanket_wake(morph_blanket_state *b) {
+void morph_blanket_forget(morph_blanket_state *b) {
     for (int t = 0; t < b->touches; t++)
         b->touch[t].wake = 0.0;
+    for (int t = 0; t < b->angles; t++)
+        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+    memset(b->push, 0, (size_t)b->links * sizeof *b->push);
+    memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
 }
 
 void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
@@ -188,47 +195,130 @@ void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
     }
 }
 
-/* The place's centre q moves by weight_j times what joint j moves; joints move by weight_j times push, so q
- * by push / inverse. Normal: unilateral. Friction: undo the tangential motion since the step's start, by at
- * most friction times the normal push (Coulomb; sticking inside the cone, sliding on it). */
-void morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
-    double q[3], change[3], slide[3];
-    place_of(x, c->joint, c->corners, c->weight, q);
-    const double gap = morph_dot(c->normal, q) - c->level;
-    const double old = c->push;
-    c->push = fmax(0.0, old - gap * c->inverse);
-    if (c->push == 0.0 && old == 0.0) return;
-    for (int k = 0; k < 3; k++)
-        change[k] = (c->push - old) * c->normal[k];
-    if (friction > 0.0) {
-        morph_sub(q, c->before, slide);
-        const double along = morph_dot(slide, c->normal);
-        for (int k = 0; k < 3; k++)
-            slide[k] = c->drag[k] - (slide[k] - along * c->normal[k]) * c->inverse;
-        const double size = morph_norm(slide), most = friction * c->push;
-        const double keep = size > most ? most / size : 1.0;
-        for (int k = 0; k < 3; k++) {
-            change[k] += keep * slide[k] - c->drag[k];
-            c->drag[k] = keep * slide[k];
-        }
-    }
+static void move_corners(const morph_contact *c, double *x, const double change[3]) {
     for (int j = 0; j < c->corners; j++)
         for (int k = 0; k < 3; k++)
             x[3 * c->joint[j] + k] += c->weight[j] * change[k];
 }
 
-double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
-    double depth = 0.0, move = 0.0;
-    for (int j = 0; j < b->joints; j++) {
-        if (!isnan(b->def.base)) depth = fmax(depth, b->def.base + b->structure->def.radius - x[3 * j + 2]);
-        move = fmax(move, morph_dist(&x[3 * j], &b->before[3 * j]));
+/* Sets the friction to `want` without its normal part, cut to the cone; returns the change in `change`. */
+static void set_drag(morph_contact *c, const double want[3], double friction, double change[3]) {
+    const double along = morph_dot(want, c->normal), most = friction * c->push;
+    double drag[3];
+    for (int k = 0; k < 3; k++)
+        drag[k] = want[k] - along * c->normal[k];
+    const double size = morph_norm(drag), keep = size > most ? most / size : 1.0;
+    for (int k = 0; k < 3; k++) {
+        change[k] += keep * drag[k] - c->drag[k];
+        c->drag[k] = keep * drag[k];
     }
+}
+
+/* The place's centre q moves by weight_j times what joint j moves; joints move by weight_j times push, so q
+ * by push / inverse. Normal: unilateral. Friction: undo the tangential motion since the step's start, by at
+ * most friction times the normal push (Coulomb; sticking inside the cone, sliding on it). */
+void morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
+    double q[3], change[3], want[3];
+    place_of(x, c->joint, c->corners, c->weight, q);
+    const double gap = morph_dot(c->normal, q) - c->level;
+    const double old = c->push;
+    c->push = fmax(0.0, old - gap * c->inverse);
+    if (c->push == 0.0 && old == 0.0) return;
+    for (int k = 0; k < 3; k++) {
+        change[k] = (c->push - old) * c->normal[k];
+        want[k] = c->drag[k] - (q[k] - c->before[k]) * c->inverse;
+    }
+    if (friction > 0.0) set_drag(c, want, friction, change);
+    move_corners(c, x, change);
+}
+
+void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most) {
+    for (int n = 0; n < b->contacts && warm > 0.0; n++) {
+        morph_contact *c = &b->contact[n];
+        const morph_hold *hold = &b->hold[c->source];
+        if (hold->push == 0.0) continue;
+        double change[3], want[3];
+        c->push = fmin(warm * hold->push, most);
+        for (int k = 0; k < 3; k++) {
+            change[k] = c->push * c->normal[k];
+            want[k] = warm * hold->drag[k];
+        }
+        set_drag(c, want, b->def.friction, change);
+        move_corners(c, x, change);
+    }
+}
+
+void morph_blanket_keep_contacts(morph_blanket_state *b) {
+    memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
+    for (int n = 0; n < b->contacts; n++) {
+        const morph_contact *c = &b->contact[n];
+        b->hold[c->source].push = c->push;
+        memcpy(b->hold[c->source].drag, c->drag, sizeof c->drag);
+    }
+}
+
+static double base_depth(const morph_blanket_state *b, const double *x) {
+    double depth = 0.0;
+    for (int j = 0; j < b->joints && !isnan(b->def.base); j++)
+        depth = fmax(depth, b->def.base + b->structure->def.radius - x[3 * j + 2]);
+    return depth;
+}
+
+double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
+    double depth = base_depth(b, x);
     for (int k = 0; k < b->touches; k++) {
         const morph_touch *t = &b->touch[k];
-        if (b->path + move < t->wake) continue;
+        if (b->path < t->wake) continue;
         double q[3];
         place_of(x, t->joint, t->corners, t->weight, q);
         depth = fmax(depth, t->radius - morph_sdf_eval(b->sdf, q, NULL, NULL));
     }
     return depth;
+}
+
+/* One contact at the deepest place of an element by exact distance; returns its violation. */
+static double find_deepest(morph_blanket_state *b, const double *x, const int *joint, int corners,
+                           double radius) {
+    const double near = NEAR * b->structure->spacing;
+    double weight[3] = {0.0};
+    morph_closest at;
+    if (corners == 2)
+        morph_distance_segment(b->exact, &x[3 * joint[0]], &x[3 * joint[1]], weight, &at);
+    else
+        morph_distance_triangle(b->exact, &x[3 * joint[0]], &x[3 * joint[1]], &x[3 * joint[2]], weight, &at);
+    if (at.distance - radius > near) return 0.0;
+    morph_contact *c = add_contact(b, joint, corners, weight, 0);
+    double q[3];
+    place_of(x, joint, corners, weight, q);
+    memcpy(c->normal, at.normal, sizeof c->normal);
+    c->level = morph_dot(c->normal, q) - at.distance + radius + CONTACT_MARGIN * b->structure->spacing;
+    c->radius = -1.0; /* the plane stays */
+    b->contacts++;
+    return fmax(0.0, radius - at.distance);
+}
+
+/* Whether any of the touches [from, to) has been near lately. */
+static bool awake(const morph_blanket_state *b, int from, int to) {
+    for (int t = from; t < to; t++)
+        if (b->path >= b->touch[t].wake) return true;
+    return false;
+}
+
+double morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
+    const morph_structure *s = b->structure;
+    double depth = 0.0;
+    int t = s->joints;
+    b->contacts = 0;
+    for (int l = 0; l < s->links; l++) {
+        /* Links of the skin's layer are edges of its triangles. */
+        const bool edge = s->link_kind[l] == MORPH_LINK_BOTTOM;
+        const int from = t;
+        t += edge ? 3 : 4;
+        if (!edge && awake(b, from, t))
+            depth = fmax(depth, find_deepest(b, x, s->link[l], 2, s->link_radius[l]));
+    }
+    for (int k = 0; k < s->skin_triangles; k++, t += 5)
+        if (awake(b, t, t + 5)) depth = fmax(depth, find_deepest(b, x, s->skin[k], 3, s->def.radius));
+    if (!isnan(b->def.base)) find_base(b, x, 0.0);
+    return fmax(depth, base_depth(b, x));
 }

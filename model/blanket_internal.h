@@ -17,6 +17,11 @@ typedef struct morph_touch {
     double stride;    /* of the search for the deepest place on the element; 0: the place is fixed */
 } morph_touch;
 
+/* What a contact's corrections came to in the last step. */
+typedef struct morph_hold {
+    double push, drag[3];
+} morph_hold;
+
 /* One contact of one step: the half space normal.q >= level for the place's centre q. */
 typedef struct morph_contact {
     int joint[3], corners;
@@ -25,6 +30,7 @@ typedef struct morph_contact {
     double before[3]; /* q at the step's start: friction acts on the motion since */
     double inverse;   /* 1 / sum weight^2 */
     double radius;    /* of the place; -1: a contact with the base plane */
+    int source;       /* number of the touch; touches + joint for the base plane */
     double push;      /* accumulated along the normal, >= 0 (m per unit weight) */
     double drag[3];   /* accumulated friction, at most friction * push */
 } morph_contact;
@@ -67,6 +73,11 @@ typedef struct morph_blanket_state {
     morph_angle *angle;
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
+    morph_hold *hold;       /* touches + joints */
+    /* Polishing a frame works on these copies' originals and puts them back: the motion never feels it. */
+    double (*spare_push)[2];
+    morph_angle *spare_angle;
+    morph_touch *spare_touch;
 } morph_blanket_state;
 
 /* sdf may be NULL (no target). Validates def; x0 is copied, velocities are 0. */
@@ -86,26 +97,33 @@ bool morph_blanket_step(morph_blanket_state *b);
 
 /* blanket_project.c */
 morph_status morph_blanket_limits_create(morph_blanket_state *b);
-void morph_blanket_project_start(morph_blanket_state *b); /* forgets the accumulated corrections */
+/* Applies `warm` times the corrections of the last step to x (0: forgets them): at rest every step needs the
+ * same ones, so that a few sweeps a step converge over many steps. */
+void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
 /* One pass over angles, lengths, contacts and posts of x; backward turns the order round. */
 void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
+double morph_blanket_cosine(const morph_angle *a, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
-/* blanket_polish.c. Violation: at x, against the structure's own limits. Polish: sweeps until x holds them
- * or stops improving; velocities are not touched. */
-morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x);
-
-void morph_blanket_polish(morph_blanket_state *b, double *x);
+/* blanket_polish.c: sweeps until x holds the structure's own limits or stops improving; contact by the exact
+ * distance where there is one. Velocities are not touched. Returns what is left. */
+morph_violation morph_blanket_polish(morph_blanket_state *b, double *x);
 
 /* blanket_contact.c */
 morph_status morph_blanket_touches_create(morph_blanket_state *b);
-void morph_blanket_wake(morph_blanket_state *b); /* after x was set from outside: forgets what is far */
+/* After x was set from outside: forgets what is far, and the last step's corrections. */
+void morph_blanket_forget(morph_blanket_state *b);
 /* Lists the contacts near x; `before` in the state is where friction counts from. */
 void morph_blanket_find_contacts(morph_blanket_state *b, const double *x);
 /* Planes of the listed contacts anew at x, corrections kept. */
 void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x);
-/* Deepest known violation of a place's radius or the base plane at x, m, >= 0. */
+/* Deepest violation of a place's radius or the base plane at x, m, >= 0. */
 double morph_blanket_depth(const morph_blanket_state *b, const double *x);
+/* The same by exact distances over whole links and triangles, listed as contacts on the way. */
+double morph_blanket_find_exact(morph_blanket_state *b, const double *x);
+/* Part of project_start; most: largest push to start with, m. */
+void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
+void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */
 void morph_blanket_project_contact(morph_contact *c, double *x, double friction);
 
 #endif

@@ -1,23 +1,21 @@
 /* What a recorded frame is held to: the violations left, and the sweeps that remove them. */
 #include "model/blanket_internal.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-#define MOST_SWEEPS 400
+/* Rounds of SWEEPS sweeps with contacts found anew for each. A frame of the moving blanket is nearly inside
+ * its limits (the sweeps aim inside), so most need no round or one. */
+#define ROUNDS 24
+#define SWEEPS 8
+/* Rounds with contact by exact distances, which cost a tree search per element. */
+#define EXACT_ROUNDS 6
+/* What counts as held, in spacings: lengths a tenth of what a plan's lengths are checked to (1e-6), clearance
+ * what a plan's clearance is checked to. Posts come out exact to rounding. */
+#define LENGTH_HELD 1e-7
+#define CLEARANCE_HELD 1e-3
 
-static double cosine(const morph_angle *a, const double *x) {
-    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
-    for (int j = 0; j < a->joints; j++)
-        for (int k = 0; k < 3; k++) {
-            u[k] += a->su[j] * x[3 * a->joint[j] + k];
-            v[k] += a->sv[j] * x[3 * a->joint[j] + k];
-        }
-    const double scale = sqrt(morph_dot(u, u) * morph_dot(v, v));
-    return scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
-}
-
-morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x) {
+/* Of lengths, posts and angles at x. */
+static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
     morph_violation worst = {0};
     for (int l = 0; l < b->links; l++) {
@@ -30,24 +28,43 @@ morph_violation morph_blanket_violation(const morph_blanket_state *b, const doub
         worst.post = fmax(worst.post, fabs(length / s->post_length[p] - 1.0));
     }
     for (int t = 0; t < b->angles; t++) {
-        const morph_angle *a = &b->angle[t];
-        const double c = cosine(a, x);
-        worst.angle = fmax(worst.angle, fmax(a->lowest - c, c - a->highest));
+        const double c = morph_blanket_cosine(&b->angle[t], x);
+        worst.angle = fmax(worst.angle, fmax(b->angle[t].lowest - c, c - b->angle[t].highest));
     }
-    worst.clearance = morph_blanket_depth(b, x);
     return worst;
 }
 
-void morph_blanket_polish(morph_blanket_state *b, double *x) {
-    memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
-    const double length = 1e-7 * b->structure->spacing, clear = 1e-3 * b->structure->spacing;
-    for (int sweep = 0; sweep < MOST_SWEEPS; sweep++) {
-        if (sweep % 8 == 0) {
-            const morph_violation v = morph_blanket_violation(b, x);
-            if (v.length <= length && v.clearance <= clear && v.post < 1e-12) break;
-            morph_blanket_find_contacts(b, x);
-            morph_blanket_project_start(b);
-        }
-        morph_blanket_sweep(b, x, (sweep & 1) != 0, 0.0);
+static bool held(const morph_blanket_state *b, const morph_violation *v) {
+    const double spacing = b->structure->spacing;
+    return v->length <= LENGTH_HELD * spacing && v->clearance <= CLEARANCE_HELD * spacing && v->post < 1e-12;
+}
+
+static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int rounds) {
+    for (int round = 0;; round++) {
+        morph_violation v = member_violation(b, x);
+        if (exact)
+            v.clearance = morph_blanket_find_exact(b, x);
+        else
+            v.clearance = morph_blanket_depth(b, x);
+        if (held(b, &v) || round == rounds) return v;
+        if (!exact) morph_blanket_find_contacts(b, x);
+        morph_blanket_project_start(b, x, 0.0);
+        for (int sweep = 0; sweep < SWEEPS; sweep++)
+            morph_blanket_sweep(b, x, (sweep & 1) != 0, 0.0);
     }
+}
+
+morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
+    const size_t push = (size_t)b->links * sizeof *b->push, angle = (size_t)b->angles * sizeof *b->angle,
+                 touch = (size_t)b->touches * sizeof *b->touch;
+    memcpy(b->spare_push, b->push, push);
+    memcpy(b->spare_angle, b->angle, angle);
+    memcpy(b->spare_touch, b->touch, touch);
+    memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
+    morph_violation v = polish(b, x, false, ROUNDS);
+    if (b->exact && b->sdf) v = polish(b, x, true, EXACT_ROUNDS);
+    memcpy(b->push, b->spare_push, push);
+    memcpy(b->angle, b->spare_angle, angle);
+    memcpy(b->touch, b->spare_touch, touch);
+    return v;
 }

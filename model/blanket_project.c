@@ -1,14 +1,14 @@
 /* Projections of the blanket: rigid posts, length limits, angle limits. */
 #include "model/blanket_internal.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 /* The sweeps converge towards the limits from outside, so they aim a little inside: what is left after them
  * then still holds the true limits. Small against what a limit means (a link of 1 spacing has a range of 0.6,
  * an angle one of 80 degrees). */
 #define LENGTH_MARGIN 1e-3 /* spacings */
 #define ANGLE_MARGIN 0.01  /* radians */
+
+/* Weights of joints that one correction is taken to carry at rest, at most. */
+#define MOST_CARRIED 16.0
 
 /* Joints of a tuple with their parts in u and v. */
 static void set_angle(morph_angle *a, const int uj[2], const int vj[2], const double limit[2]) {
@@ -40,7 +40,9 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->limit = morph_alloc((size_t)b->links, sizeof *b->limit);
     b->push = morph_alloc((size_t)b->links, sizeof *b->push);
     b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
-    if (!b->limit || !b->push || !b->angle) return MORPH_ERR_NOMEM;
+    b->spare_push = morph_alloc((size_t)b->links, sizeof *b->spare_push);
+    b->spare_angle = morph_alloc((size_t)b->angles, sizeof *b->spare_angle);
+    if (!b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle) return MORPH_ERR_NOMEM;
     for (int l = 0; l < b->links; l++) {
         const double lo = s->length_limit[l][0], hi = s->length_limit[l][1];
         const double margin = fmin(LENGTH_MARGIN * s->spacing, 0.25 * (hi - lo));
@@ -57,12 +59,6 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
         set_angle(&b->angle[n++], uj, vj, s->link_link_limit[t]);
     }
     return MORPH_OK;
-}
-
-void morph_blanket_project_start(morph_blanket_state *b) {
-    memset(b->push, 0, (size_t)b->links * sizeof *b->push);
-    for (int t = 0; t < b->angles; t++)
-        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
 }
 
 /* With e the post before the step and d after the drift, the ends move by -+ q e / 2 so that |d + q e| = h:
@@ -110,6 +106,14 @@ static double unilateral(double *push, double gap) {
     return *push - old;
 }
 
+static void stretch(double *xi, double *xj, const double d[3], double length, double grow) {
+    const double q = 0.5 * grow / length;
+    for (int k = 0; k < 3; k++) {
+        xi[k] -= q * d[k];
+        xj[k] += q * d[k];
+    }
+}
+
 static void project_length(morph_blanket_state *b, int l, double *x) {
     const int *ends = b->structure->link[l];
     double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], d[3];
@@ -118,42 +122,96 @@ static void project_length(morph_blanket_state *b, int l, double *x) {
     if (!(length > 0.0)) return;
     double grow = unilateral(&b->push[l][0], length - b->limit[l][0]);
     if (b->push[l][0] == 0.0) grow -= unilateral(&b->push[l][1], b->limit[l][1] - length);
-    if (grow == 0.0) return;
-    const double q = 0.5 * grow / length;
-    for (int k = 0; k < 3; k++) {
-        xi[k] -= q * d[k];
-        xj[k] += q * d[k];
-    }
+    if (grow != 0.0) stretch(xi, xj, d, length, grow);
+}
+
+static void start_length(morph_blanket_state *b, int l, double *x, double warm, double most) {
+    const int *ends = b->structure->link[l];
+    double *push = b->push[l], d[3];
+    push[0] = fmin(warm * push[0], most);
+    push[1] = fmin(warm * push[1], most);
+    if (push[0] == push[1]) return;
+    morph_sub(&x[3 * ends[1]], &x[3 * ends[0]], d);
+    const double length = morph_norm(d);
+    if (length > 0.0) stretch(&x[3 * ends[0]], &x[3 * ends[1]], d, length, push[0] - push[1]);
 }
 
 /* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
- * su dc/du + sv dc/dv. Correction along it over the sum of squares. */
-static void project_angle(morph_angle *a, double *x) {
-    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0}, grad[4][3];
+ * su dc/du + sv dc/dv. Returns the sum of the gradients' squares; 0 where the arms are parallel, which the
+ * limits keep far from. arm: the shorter arm's length. grad may be
+ * NULL, then so may arm, and 0 is returned. */
+static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
+    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
     for (int j = 0; j < a->joints; j++)
         for (int k = 0; k < 3; k++) {
             u[k] += a->su[j] * x[3 * a->joint[j] + k];
             v[k] += a->sv[j] * x[3 * a->joint[j] + k];
         }
-    const double uu = morph_dot(u, u), vv = morph_dot(v, v);
-    const double scale = sqrt(uu * vv);
-    if (!(scale > 0.0)) return;
-    const double c = morph_dot(u, v) / scale;
-    if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return;
+    const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
+    *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
+    if (!grad || !(scale > 0.0)) return 0.0;
+    *arm = sqrt(fmin(uu, vv));
     double square = 0.0;
     for (int j = 0; j < a->joints; j++) {
         for (int k = 0; k < 3; k++)
             grad[j][k] =
-                a->su[j] * (v[k] / scale - c * u[k] / uu) + a->sv[j] * (u[k] / scale - c * v[k] / vv);
+                a->su[j] * (v[k] / scale - *c * u[k] / uu) + a->sv[j] * (u[k] / scale - *c * v[k] / vv);
         square += morph_dot(grad[j], grad[j]);
     }
-    /* Parallel arms have no gradient; the limits keep far from there. */
-    if (!(square * scale > 1e-12)) return;
-    double change = unilateral(&a->push[0], (c - a->floor) / square);
-    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], (a->ceiling - c) / square);
+    return square * scale > 1e-12 ? square : 0.0;
+}
+
+double morph_blanket_cosine(const morph_angle *a, const double *x) {
+    double c;
+    cosine(a, x, &c, NULL, NULL);
+    return c;
+}
+
+static double clip(double value, double most) {
+    return fmax(-most, fmin(most, value));
+}
+
+static void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
     for (int j = 0; j < a->joints; j++)
         for (int k = 0; k < 3; k++)
             x[3 * a->joint[j] + k] += change * grad[j][k];
+}
+
+/* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
+ * the shorter arm. */
+static void project_angle(morph_angle *a, double *x) {
+    double c, arm, grad[4][3];
+    cosine(a, x, &c, NULL, NULL);
+    if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return;
+    const double square = cosine(a, x, &c, grad, &arm);
+    if (square == 0.0) return;
+    const double most = 0.5 * arm / sqrt(square);
+    double change = unilateral(&a->push[0], clip((c - a->floor) / square, most));
+    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) / square, most));
+    turn(a, x, (const double(*)[3])grad, change);
+}
+
+static void start_angle(morph_angle *a, double *x, double warm, double most) {
+    double c, arm, grad[4][3];
+    if (a->push[0] == a->push[1]) return;
+    const double square = cosine(a, x, &c, grad, &arm);
+    const double limit = square > 0.0 ? most / sqrt(square) : 0.0;
+    a->push[0] = fmin(warm * a->push[0], limit);
+    a->push[1] = fmin(warm * a->push[1], limit);
+    if (square > 0.0) turn(a, x, (const double(*)[3])grad, a->push[0] - a->push[1]);
+}
+
+/* What carries weight moves joints by a few gravity step^2 every step. An impact's corrections are far larger
+ * and must not come again in the next step: they would feed the motion. Posts come last: their corrections
+ * are not kept, and contacts must not answer before they have. */
+void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm) {
+    const double most = MOST_CARRIED * b->def.gravity * b->step * b->step;
+    for (int t = 0; t < b->angles; t++)
+        start_angle(&b->angle[t], x, warm, most);
+    for (int l = 0; l < b->links; l++)
+        start_length(b, l, x, warm, most);
+    morph_blanket_start_contacts(b, x, warm, most);
+    project_posts(b, x);
 }
 
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,

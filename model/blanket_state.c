@@ -59,6 +59,10 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->angle);
     free(b->touch);
     free(b->contact);
+    free(b->hold);
+    free(b->spare_push);
+    free(b->spare_angle);
+    free(b->spare_touch);
     free(b);
 }
 

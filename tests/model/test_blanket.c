@@ -298,6 +298,34 @@ static void test_step_is_halved(void **state) {
     morph_trajectory_free(&t);
 }
 
+/* Whatever the start, the run ends with sound numbers. */
+static void test_wild_starts(void **state) {
+    (void)state;
+    morph_structure *s = grid(4);
+    morph_blanket_def def = free_def();
+    def.base = 0.0;
+    def.friction = 0.6;
+    def.time = 0.3;
+    unsigned random = 2;
+    for (int run = 0; run < 12; run++) {
+        double *x0 = lifted(s, 0.5);
+        const double size = run % 3 == 0 ? 0.03 : run % 3 == 1 ? 0.2 : 2.0;
+        for (int k = 0; k < 3 * s->joints; k++) {
+            random = random * 1664525u + 1013904223u;
+            x0[k] += size * ((double)(random >> 8) / 16777216.0 - 0.5);
+        }
+        morph_trajectory t;
+        morph_blanket_report report;
+        const morph_status status = morph_blanket_run(s, NULL, NULL, &def, x0, NULL, &t, &report);
+        assert_int_equal(status, MORPH_OK);
+        for (int k = 0; k < 3 * s->joints * t.frames; k++)
+            assert_true(fabs(t.x[k]) < 100.0);
+        free(x0);
+        morph_trajectory_free(&t);
+    }
+    morph_structure_destroy(s);
+}
+
 static void test_refusals(void **state) {
     (void)state;
     morph_structure *s = grid(2);
@@ -325,6 +353,7 @@ int main(void) {
         cmocka_unit_test(test_free_fall),      cmocka_unit_test(test_oscillator),
         cmocka_unit_test(test_energy),         cmocka_unit_test(test_momentum),
         cmocka_unit_test(test_base),           cmocka_unit_test(test_stop_keeps_frames),
-        cmocka_unit_test(test_step_is_halved), cmocka_unit_test(test_refusals)};
+        cmocka_unit_test(test_step_is_halved), cmocka_unit_test(test_wild_starts),
+        cmocka_unit_test(test_refusals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
