@@ -48,6 +48,7 @@ void morph_active_destroy(morph_active *a) {
     free(a->tuple);
     free(a->has_tuple);
     free(a->point);
+    free(a->feature);
     free(a->pair);
     free(a->lower);
     free(a->upper);
@@ -55,13 +56,13 @@ void morph_active_destroy(morph_active *a) {
 }
 
 void morph_active_clear(morph_active *a, const morph_structure *s) {
-    a->links = a->tuples = a->points = a->pairs = 0;
+    a->links = a->tuples = a->points = a->features = a->pairs = 0;
     memset(a->has_link, 0, (size_t)s->links * sizeof *a->has_link);
     memset(a->has_tuple, 0, (size_t)(s->link_posts + s->link_links) * sizeof *a->has_tuple);
 }
 
 int morph_active_rows(const morph_active *a, const morph_structure *s) {
-    return s->posts + a->links + a->tuples + a->points + a->pairs;
+    return s->posts + a->links + a->tuples + a->points + a->features + a->pairs;
 }
 
 int morph_possible_rows(const morph_structure *s) {
@@ -209,6 +210,104 @@ static void add_samples(examiner *e, const int *joint, double reach) {
     }
 }
 
+/* On which feature of its triangle a point of the target lies: the number of corners that carry it (1 vertex,
+ * 2 edge, 3 face); for an edge also its direction. */
+static int target_feature(const morph_distance *exact, const morph_closest *c, double edge[3]) {
+    const morph_mesh *mesh = morph_distance_mesh(exact);
+    const int *t = &mesh->t[3 * c->triangle];
+    double w[3];
+    morph_point_triangle(c->point, &mesh->v[3 * t[0]], &mesh->v[3 * t[1]], &mesh->v[3 * t[2]], w);
+    int carried = 0, on[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++)
+        if (w[i] > 1e-6) on[carried++] = t[i];
+    if (carried == 2) morph_sub(&mesh->v[3 * on[1]], &mesh->v[3 * on[0]], edge);
+    return carried;
+}
+
+/* The vertex of the target that pokes furthest through a triangle; false if none does. Metres. */
+static bool poking_vertex(const examiner *e, const int *joint, double point[3]) {
+    const morph_mesh *mesh = morph_distance_mesh(e->world->exact);
+    const double *a = &e->metres[3 * joint[0]], *b = &e->metres[3 * joint[1]], *c = &e->metres[3 * joint[2]];
+    double u[3], v[3], n[3], furthest = 0.0;
+    morph_sub(b, a, u);
+    morph_sub(c, a, v);
+    morph_cross(u, v, n);
+    const double norm = morph_norm(n);
+    for (int k = 0; k < mesh->vertices; k++) {
+        double w[3], weight[3], to[3];
+        morph_sub(&mesh->v[3 * k], a, to);
+        const double height = morph_dot(n, to) / norm;
+        /* Beyond half a spacing it is another part of the target. */
+        if (height <= furthest || height > 0.5 * e->world->structure->spacing) continue;
+        for (int m = 0; m < 3; m++)
+            w[m] = mesh->v[3 * k + m] - height * n[m] / norm;
+        if (morph_point_triangle(w, a, b, c, weight) > 1e-9 * e->world->structure->spacing) continue;
+        furthest = height;
+        memcpy(point, &mesh->v[3 * k], 3 * sizeof *point);
+    }
+    return furthest > 0.0;
+}
+
+static bool set_feature(const examiner *e, morph_feature *f, const double point[3], const double outward[3]) {
+    const double a = e->world->structure->spacing;
+    for (int k = 0; k < 3; k++)
+        f->point[k] = point[k] / a;
+    double u[3], v[3], n[3];
+    morph_sub(&e->x[3 * f->joint[1]], &e->x[3 * f->joint[0]], u);
+    if (f->is_edge)
+        memcpy(v, f->edge, sizeof v);
+    else
+        morph_sub(&e->x[3 * f->joint[2]], &e->x[3 * f->joint[0]], v);
+    morph_cross(u, v, n);
+    f->sign = morph_dot(n, outward) >= 0.0 ? 1.0 : -1.0;
+    /* Nearly parallel lines have no plane between them. */
+    return morph_norm(n) > 0.05 * morph_norm(u) * morph_norm(v);
+}
+
+static void add_feature(examiner *e, const morph_feature *f) {
+    morph_active *a = e->active;
+    for (int k = 0; k < a->features; k++)
+        if (memcmp(a->feature[k].joint, f->joint, sizeof f->joint) == 0 &&
+            a->feature[k].is_edge == f->is_edge && morph_dist(a->feature[k].point, f->point) < 1e-6)
+            return;
+    if (!grow((void **)&a->feature, &a->feature_capacity, a->features + 1, sizeof *f)) {
+        e->status = MORPH_ERR_NOMEM;
+        return;
+    }
+    a->feature[a->features++] = *f;
+    e->added++;
+}
+
+/* The row for an element's closest pair with the target: of the feature where the element's inside is
+ * closest, of the point otherwise. */
+static void add_closest(examiner *e, const int *joint, const double *weight, int n, const morph_closest *c) {
+    morph_feature f = {.joint = {joint[0], joint[1], joint[n - 1]}};
+    int kept[3], count = 0;
+    for (int i = 0; i < n; i++)
+        if (weight[i] > 1e-6) kept[count++] = i;
+    double point[3];
+    memcpy(point, c->point, sizeof point);
+    bool use = count > 1;
+    if (count == 2) {
+        const int carried = target_feature(e->world->exact, c, f.edge);
+        f.is_edge = true;
+        f.joint[0] = joint[kept[0]];
+        f.joint[1] = f.joint[2] = joint[kept[1]];
+        if (carried == 1) { /* a link over a vertex: as over an edge across it */
+            double u[3];
+            morph_sub(&e->x[3 * f.joint[1]], &e->x[3 * f.joint[0]], u);
+            morph_cross(c->normal, u, f.edge);
+        }
+        use = carried < 3 && c->distance > 0.0;
+    } else if (count == 3 && c->distance <= 0.0) {
+        use = poking_vertex(e, joint, point);
+    }
+    if (use && set_feature(e, &f, point, c->normal))
+        add_feature(e, &f);
+    else
+        add_point(e, joint, weight, n, 0.02);
+}
+
 static void skin_name(const morph_structure *s, int t, char *text, size_t size) {
     const int *n = s->joint_node[s->skin[t][0]];
     snprintf(text, size, "skin triangle %d at (%d,%d)", t, n[0], n[1]);
@@ -247,11 +346,7 @@ static void examine_element(examiner *e, const int *joint, int n, int element) {
         if (v.distance < reach * a) add_point(e, &joint[i], &one, 1, 0.5);
     }
     if (n == 3) add_samples(e, joint, reach);
-    /* A violated deepest point needs its own row unless one stands within a fraction of the radius (over
-     * which the clearance of a link across an edge changes little); an inside one only where nothing stands
-     * near. */
-    const bool violated = distance < r + e->inset->clearance;
-    add_point(e, joint, weight, n, violated ? fmin(0.02, 0.2 * r + 1e-3) : 0.15);
+    add_closest(e, joint, weight, n, &c);
 }
 
 static void renew_bias(examiner *e) {
@@ -429,6 +524,7 @@ int morph_active_blocks(morph_active *a, const morph_world *world, const int *un
     a->length_rows = (morph_length_rows){s, a->links, a->link, inset->length};
     a->angle_rows = (morph_angle_rows){s, a->tuples, a->tuple, inset->angle};
     a->clearance_rows = (morph_clearance_rows){s, world->sdf, a->points, a->point, inset->clearance};
+    a->feature_rows = (morph_feature_rows){s, a->features, a->feature, inset->clearance};
     a->separation_rows = (morph_separation_rows){s, a->pairs, a->pair, inset->self};
     double *lo = a->lower, *hi = a->upper;
     int n = 0;
@@ -440,6 +536,8 @@ int morph_active_blocks(morph_active *a, const morph_world *world, const int *un
     lo += a->tuples, hi += a->tuples;
     if (a->points) out[n++] = morph_block_clearance(&a->clearance_rows, unknown, lo, hi);
     lo += a->points, hi += a->points;
+    if (a->features) out[n++] = morph_block_features(&a->feature_rows, unknown, lo, hi);
+    lo += a->features, hi += a->features;
     if (a->pairs) out[n++] = morph_block_separation(&a->separation_rows, unknown, lo, hi);
     return n;
 }

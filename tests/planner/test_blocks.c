@@ -145,6 +145,11 @@ static void contact(void **state) {
         morph_clearance_rows rows = {f->structure, f->sdf, 40, point, 0.01};
         const morph_block block = morph_block_clearance(&rows, NULL, lower, upper);
         expect_right(f, &block);
+        const morph_feature feature[2] = {{{0, 1, 5}, false, {0.2, 0.1, 0.3}, {0.0, 0.0, 0.0}, 1.0},
+                                          {{6, 7, 7}, true, {-0.2, 0.1, 0.4}, {0.3, -0.9, 0.1}, -1.0}};
+        morph_feature_rows features = {f->structure, 2, feature, 0.0};
+        const morph_block sharp = morph_block_features(&features, NULL, lower, upper);
+        expect_right(f, &sharp);
         morph_pair pair[2] = {{{0, 7}, {0.6, 0.0, 0.8}, 0.08, {0, 8}},
                               {{2, 9}, {0.0, 1.0, 0.0}, 0.08, {40, 3}}};
         morph_separation_rows apart = {f->structure, 2, pair, 0.0};
