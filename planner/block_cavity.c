@@ -104,7 +104,18 @@ static double cover_scale(const morph_cover_term *d, int y) {
     return d->scale * d->cavity->expose[y].area / (a * a);
 }
 
-/* (n.e - r)^2 + slide (|e|^2 - (n.e)^2) */
+/* Rounding of |t|: a quarter of a link's radius at the default. */
+#define PRESS_ROUND 0.01
+
+/* t^2 + press (sqrt(t^2 + e^2) - e) and its first and second derivatives by t. */
+static double along_cost(double t, double press, double d[2]) {
+    const double root = sqrt(t * t + PRESS_ROUND * PRESS_ROUND);
+    d[0] = 2.0 * t + press * t / root;
+    d[1] = 2.0 + press * PRESS_ROUND * PRESS_ROUND / (root * root * root);
+    return t * t + press * (root - PRESS_ROUND);
+}
+
+/* cost(n.e - r) + slide (|e|^2 - (n.e)^2) */
 static morph_status cover_value(void *data, const double *x, double *f) {
     const morph_cover_term *d = data;
     const double r = d->cavity->structure->def.radius / d->cavity->structure->spacing;
@@ -113,8 +124,9 @@ static morph_status cover_value(void *data, const double *x, double *f) {
         double e[3];
         cover_offset(d, y, x, e);
         const double along = morph_dot(d->cavity->expose[y].normal, e);
-        f[0] +=
-            cover_scale(d, y) * ((along - r) * (along - r) + d->slide * (morph_dot(e, e) - along * along));
+        double cost[2];
+        f[0] += cover_scale(d, y) *
+                (along_cost(along - r, d->press, cost) + d->slide * (morph_dot(e, e) - along * along));
     }
     return MORPH_OK;
 }
@@ -124,22 +136,24 @@ static morph_status cover_walk(void *data, const double *x, const double *weight
     const double r = d->cavity->structure->def.radius / d->cavity->structure->spacing;
     const bool first = morph_sink_wants_jacobian(sink), second = morph_sink_wants_hessian(sink);
     for (int y = 0; y < d->cavity->exposed; y++) {
-        const double *n = d->cavity->expose[y].normal, *w = d->weight[y], scale = 2.0 * cover_scale(d, y);
+        const double *n = d->cavity->expose[y].normal, *w = d->weight[y], scale = cover_scale(d, y);
         const int *joint = d->joint[y];
         double e[3];
         cover_offset(d, y, x, e);
         const double along = morph_dot(n, e);
+        double cost[2];
+        along_cost(along - r, d->press, cost);
         for (int a = 0; a < 3; a++)
             for (int k = 0; k < 3; k++) {
-                const double g = (along - r) * n[k] + d->slide * (e[k] - along * n[k]);
+                const double g = cost[0] * n[k] + 2.0 * d->slide * (e[k] - along * n[k]);
                 if (first) morph_sink_jacobian(sink, 0, 3 * joint[a] + k, scale * w[a] * g);
                 for (int b = 0; b < 3 && second; b++)
                     for (int m = 0; m < 3; m++)
                         if (3 * joint[a] + k >= 3 * joint[b] + m)
-                            morph_sink_hessian(
-                                sink, 3 * joint[a] + k, 3 * joint[b] + m,
-                                weight[0] * scale * w[a] * w[b] *
-                                    ((1.0 - d->slide) * n[k] * n[m] + (k == m ? d->slide : 0.0)));
+                            morph_sink_hessian(sink, 3 * joint[a] + k, 3 * joint[b] + m,
+                                               weight[0] * scale * w[a] * w[b] *
+                                                   ((cost[1] - 2.0 * d->slide) * n[k] * n[m] +
+                                                    (k == m ? 2.0 * d->slide : 0.0)));
             }
     }
     return MORPH_OK;

@@ -115,12 +115,14 @@ typedef struct morph_gap_term {
 morph_block morph_block_gap(morph_gap_term *data, const int *unknown);
 
 /* Objective: sum over exposed points of A_y |W x - y|^2 split along the target's normal n and across it:
- * (n.(W x - y) - r)^2 + slide |(I - n n^T)(W x - y)|^2. Closest skin points W are fixed. */
+ * t^2 + press (sqrt(t^2 + 0.01^2) - 0.01) + slide |(I - n n^T)(W x - y)|^2 with t = n.(W x - y) - r. The
+ * second part is about press |t|: squares alone leave many small gaps rather than contact. Closest skin
+ * points W are fixed. */
 typedef struct morph_cover_term {
     const morph_cavity *cavity;
     const int (*joint)[3]; /* exposed entries */
     const double (*weight)[3];
-    double slide, scale;
+    double slide, press, scale;
 } morph_cover_term;
 morph_block morph_block_cover(morph_cover_term *data, const int *unknown);
 

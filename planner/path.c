@@ -3,6 +3,7 @@
  * is inserted and the spline drawn anew. */
 #include "planner/path.h"
 #include "planner/project.h"
+#include "solvers/dense.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -10,10 +11,12 @@
 enum { FINE = 12 }; /* points examined per interval */
 
 morph_path_options morph_path_defaults(void) {
-    return (morph_path_options){.end = {.length = 1e-3, .angle = 2e-3, .clearance = 1e-3, .self = 1e-3},
+    return (morph_path_options){.end = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
                                 .interior = {.length = 0.02, .angle = 0.03, .clearance = 0.06, .self = 0.02},
                                 .intervals = 12,
                                 .poses = 64,
+                                .sweeps = 1,
+                                .smoothness = 30.0,
                                 .refine = true};
 }
 
@@ -208,14 +211,61 @@ static bool out_of_time(const pather *p) {
            (p->options->seconds > 0.0 && morph_seconds() - p->started > p->options->seconds);
 }
 
+/* Smooths the poses between the ends: min sum |y - x|^2 + weight sum |second differences|^2, coordinate by
+ * coordinate one banded system; poses keep their places in the row, so even progress stays even. */
+static morph_status smooth_poses(pather *p, double weight) {
+    const int n = p->count - 2, width = p->coordinates;
+    double *matrix = morph_alloc((size_t)n, (size_t)n * sizeof(double));
+    double *right = morph_alloc((size_t)n, (size_t)width * sizeof(double));
+    morph_status status = matrix && right ? MORPH_OK : MORPH_ERR_NOMEM;
+    for (int k = 0; k < n && status == MORPH_OK; k++) {
+        matrix[(size_t)k * (size_t)n + (size_t)k] += 1.0;
+        memcpy(&right[(size_t)k * (size_t)width], pose(p, k + 1), (size_t)width * sizeof *right);
+    }
+    /* The second difference at pose m has weights 1, -2, 1 on its neighbours; the ends are known and go to
+     * the right side. */
+    for (int m = 1; m <= n && status == MORPH_OK; m++)
+        for (int a = -1; a <= 1; a++) {
+            const double wa = a == 0 ? -2.0 : 1.0;
+            const int row = m + a - 1;
+            if (row < 0 || row >= n) continue;
+            for (int b = -1; b <= 1; b++) {
+                const double w = weight * wa * (b == 0 ? -2.0 : 1.0);
+                const int column = m + b - 1;
+                if (column >= 0 && column < n)
+                    matrix[(size_t)row * (size_t)n + (size_t)column] += w;
+                else
+                    for (int i = 0; i < width; i++)
+                        right[(size_t)row * (size_t)width + (size_t)i] -= w * pose(p, m + b)[i];
+            }
+        }
+    if (status == MORPH_OK) status = morph_dense_solve(matrix, n, right, width);
+    if (status == MORPH_OK) memcpy(pose(p, 1), right, (size_t)n * (size_t)width * sizeof *right);
+    free(matrix);
+    free(right);
+    return status;
+}
+
+/* Poses by turns smoothed and moved inside their limits: both hold nearly at the end, the limits exactly. */
+static morph_status settle_poses(pather *p) {
+    morph_status status = MORPH_OK;
+    for (int sweep = 0; sweep < p->options->sweeps && status == MORPH_OK; sweep++) {
+        status = smooth_poses(p, p->options->smoothness);
+        if (status == MORPH_OK) set_parameters(p);
+        for (int k = 1; k + 1 < p->count && status == MORPH_OK; k++) {
+            status = solve_pose(p, k);
+            morph_progress(p->options->control, "path",
+                           0.7 * (sweep + (double)k / p->count) / p->options->sweeps);
+            if (status == MORPH_OK && morph_stopped(p->options->control)) status = MORPH_ERR_STOPPED;
+        }
+    }
+    return status;
+}
+
 static morph_status run(pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
     set_parameters(p);
-    for (int k = 1; k + 1 < p->count && status == MORPH_OK && p->options->refine; k++) {
-        status = solve_pose(p, k);
-        morph_progress(p->options->control, "path", 0.7 * k / p->count);
-        if (status == MORPH_OK && morph_stopped(p->options->control)) status = MORPH_ERR_STOPPED;
-    }
+    if (p->options->refine) status = settle_poses(p);
     if (status == MORPH_OK) set_parameters(p);
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {
         breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
@@ -254,8 +304,7 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     p.inset = morph_alloc(rows, sizeof(double));
     p.metres = morph_alloc(rows * width, sizeof(double));
     morph_status status = p.s && p.x && p.inset && p.metres ? MORPH_OK : MORPH_ERR_NOMEM;
-    if (status == MORPH_OK)
-        status = morph_active_create(world->structure, &p.active);
+    if (status == MORPH_OK) status = morph_active_create(world->structure, &p.active);
     if (status == MORPH_OK) {
         set_guided_poses(&p, guide, start, end);
         status = run(&p, out);

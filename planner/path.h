@@ -12,6 +12,8 @@ typedef struct morph_path_options {
     morph_inset interior; /* the inset of poses far from the end: room for the spline between them */
     int intervals;        /* to begin with, at least 8 */
     int poses;            /* at most, after all insertions */
+    int sweeps;           /* of smoothing and moving inside the limits */
+    double smoothness;    /* weight of second differences of poses beside the distance to the guide */
     double seconds;       /* wall; <= 0: none */
     bool refine;          /* false: the guide's poses as they are, nothing solved (the pure blanket) */
     const morph_control *control;

@@ -82,7 +82,10 @@ morph_status morph_project(const morph_world *world, const morph_inset *inset, i
         if (status == MORPH_OK) status = morph_pose_examine(world, x, inset, &near, active, NULL, violation);
         morph_limit which = MORPH_LIMIT_POST;
         morph_violation_worst(violation, morph_pose_tolerance, &which);
-        morph_log(control, "project %d: solved %d its %d worst %s %.3g %s rows %d (points %d pairs %d)", round, p.solved, effort->iterations, morph_limit_name(which), violation->amount[which], violation->element[which], morph_active_rows(active, world->structure), active->points, active->pairs);
+        morph_log(control, "project %d: solved %d its %d worst %s %.3g %s rows %d (points %d pairs %d)",
+                  round, p.solved, effort->iterations, morph_limit_name(which), violation->amount[which],
+                  violation->element[which], morph_active_rows(active, world->structure), active->points,
+                  active->pairs);
         if (morph_violation_worst(violation, morph_pose_tolerance, NULL) <= 1.0 && (p.solved || round > 0))
             break;
         if (morph_stopped(control)) break;

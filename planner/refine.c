@@ -9,9 +9,10 @@
 morph_refine_options morph_refine_defaults(void) {
     /* The insets leave room for the path's spline to approach the end from inside: a thousandth of a spacing,
      * and of a radian, changes the reachable shape by less than the links' radius. */
-    return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 1e-3, .self = 1e-3},
-                                  .cover_weight = MORPH_COVER_WEIGHT,
-                                  .slide = 0.1,
+    return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
+                                  .cover_weight = 5.0,
+                                  .slide = 0.01,
+                                  .press = 0.3,
                                   .reach = 0.3,
                                   .least_reach = 0.03,
                                   .hold = 1e-3,
@@ -106,9 +107,12 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     if (count < 0) return MORPH_ERR_NOMEM;
     /* The kink between target and base plane is rounded over a tenth of a spacing: the width of a link and
      * its gap. */
-    morph_gap_term gap = {r->world->cavity, r->world->sdf, 0.1, 1.0, getenv("GN") != NULL};
-    morph_cover_term cover = {r->world->cavity, (const int(*)[3])r->cover_joint,
-                              (const double(*)[3])r->cover_weight, r->options->slide,
+    morph_gap_term gap = {r->world->cavity, r->world->sdf, 0.1, 1.0, true};
+    morph_cover_term cover = {r->world->cavity,
+                              (const int(*)[3])r->cover_joint,
+                              (const double(*)[3])r->cover_weight,
+                              r->options->slide,
+                              r->options->press,
                               r->options->cover_weight};
     /* Half of the joints are in no term of the objective: held weakly where they stand, they take the
      * shortest way, and the Hessian is regular. The weight is small against the gap's (1 per spacing^2 of
@@ -137,16 +141,11 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
      * of area times gap^2), so 1e-5 in its gradient moves the gap by far less than a thousandth of a spacing.
      */
     o.tolerance = round < 2 ? 1e-4 : 1e-5;
-    o.max_iterations = getenv("MAXIT") ? atoi(getenv("MAXIT")) : 150;
-    if (getenv("MONO")) {
-        o.adaptive_mu = false;
-        o.mu_init = atof(getenv("MONO"));
-    }
-    o.mu_init = round == 0 ? 1e-2 : 1e-4;
-    if (getenv("MONO")) {
-        o.adaptive_mu = false;
-        o.mu_init = atof(getenv("MONO"));
-    }
+    o.max_iterations = 60; /* a round that wants more goes on in the next, from a feasible point */
+    /* The start is feasible and near: a large barrier would first drive it away from every limit. */
+    o.adaptive_mu = false;
+    o.mu_init = 1e-3;
+
     o.control = &r->quiet;
     if (r->options->seconds > 0.0)
         o.max_seconds = fmax(0.1, r->options->seconds - (morph_seconds() - r->started));

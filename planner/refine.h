@@ -9,6 +9,7 @@ typedef struct morph_refine_options {
     morph_inset inset;
     double cover_weight; /* w_c */
     double slide;        /* pull across the target's normal, relative to along it */
+    double press;        /* weight of |gap| beside gap^2 at the target's points */
     double reach;        /* how far a joint may move in one round, spacings: rows are chosen for that reach */
     double least_reach;  /* below this it is settled */
     double hold;         /* weight that keeps free joints where they stand */

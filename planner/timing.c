@@ -39,7 +39,7 @@ static void ratios_at(morph_path_table *table, const morph_timing *timing, doubl
     double s[4];
     const morph_structure *st = table->curve->structure;
     morph_timing_eval(timing, t, s);
-    morph_path_table_exact(table, s[0]);
+    morph_path_table_exact(table, s[0], 3);
     morph_timing_chain(st->links, table->exact, s, table->by_time);
     const double *limit[3] = {st->rate_limit, st->acceleration_limit, st->jerk_limit};
     for (int k = 0; k < 3; k++)
@@ -187,11 +187,13 @@ static void finish(morph_path_table *table, const morph_timing_options *o, morph
     report->needed = timing->duration * report->stretch;
     const double wanted = fmax(report->needed, o->duration);
     const double samples = fmax(1.0, ceil(wanted / o->sample - 1e-9));
+    /* Stretching by f divides rates by f, accelerations by f^2, jerks by f^3 at the same points: no second
+     * pass. */
+    const double f = samples * o->sample / timing->duration;
     timing->duration = samples * o->sample;
-    stretch_on_grid(table, timing, steps, worst);
-    report->worst_rate = worst[0];
-    report->worst_acceleration = worst[1];
-    report->worst_jerk = worst[2];
+    report->worst_rate = worst[0] / f;
+    report->worst_acceleration = worst[1] / (f * f);
+    report->worst_jerk = worst[2] / (f * f * f);
 }
 
 morph_status morph_timing_solve(const morph_curve *curve, const morph_timing_options *options,

@@ -28,9 +28,9 @@ void morph_path_table_free(morph_path_table *t) {
     *t = (morph_path_table){0};
 }
 
-void morph_path_table_exact(morph_path_table *t, double s) {
-    morph_curve_joints(t->curve, s, MORPH_JET - 1, t->scratch, t->joints);
-    morph_curve_lengths(t->curve->structure, t->joints, MORPH_JET - 1, t->exact);
+void morph_path_table_exact(morph_path_table *t, double s, int order) {
+    morph_curve_joints(t->curve, s, order, t->scratch, t->joints);
+    morph_curve_lengths(t->curve->structure, t->joints, order, t->exact);
 }
 
 typedef struct monomial {
@@ -86,7 +86,7 @@ static const double *lengths_at(morph_timing_rows *r, int point, double s) {
     const size_t block = MORPH_JET * (size_t)r->table->curve->structure->links;
     double *own = &r->lengths[(size_t)point * block];
     if (r->at[point] != s) {
-        morph_path_table_exact(r->table, s);
+        morph_path_table_exact(r->table, s, MORPH_JET - 1);
         memcpy(own, r->table->exact, block * sizeof *own);
         r->at[point] = s;
     }

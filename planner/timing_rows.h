@@ -13,8 +13,8 @@ typedef struct morph_path_table {
 } morph_path_table;
 morph_status morph_path_table_create(const morph_curve *curve, morph_path_table *out);
 void morph_path_table_free(morph_path_table *table);
-/* Fills table->exact at s. */
-void morph_path_table_exact(morph_path_table *table, double s);
+/* Fills table->exact at s with derivatives 0..order (at most 5). */
+void morph_path_table_exact(morph_path_table *table, double s, int order);
 
 /* One row: kind 0 rate, 1 acceleration, 2 jerk of a link at a grid time. */
 typedef struct morph_timing_row {

@@ -175,7 +175,8 @@ static void cavity_terms(void **state) {
         const morph_block block = morph_block_gap(&gap, NULL);
         expect_right(f, &block);
         assert_int_equal(morph_cavity_closest(f->cavity, metres, joint, weight, NULL), MORPH_OK);
-        morph_cover_term cover = {f->cavity, (const int(*)[3])joint, (const double(*)[3])weight, 0.1, 1.1};
+        morph_cover_term cover = {f->cavity, (const int(*)[3])joint, (const double(*)[3])weight, 0.1, 0.2,
+                                  1.1};
         const morph_block block2 = morph_block_cover(&cover, NULL);
         expect_right(f, &block2);
     }
