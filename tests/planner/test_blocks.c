@@ -171,7 +171,7 @@ static void cavity_terms(void **state) {
             f->x[i] -= i % 3 == 2 ? 0.8 : 0.0; /* down to the kink between box and base plane */
             metres[i] = f->x[i] * f->structure->spacing;
         }
-        morph_gap_term gap = {f->cavity, f->sdf, 0.1, 0.9};
+        morph_gap_term gap = {f->cavity, f->sdf, 0.1, 0.9, false};
         const morph_block block = morph_block_gap(&gap, NULL);
         expect_right(f, &block);
         assert_int_equal(morph_cavity_closest(f->cavity, metres, joint, weight, NULL), MORPH_OK);
