@@ -31,11 +31,18 @@ static void sentence(morph_text *page, const char *tag, const char *plain) {
 
 void morph_report_outcome(morph_text *page, const morph_summary *s) {
     const char *what = "The run was stopped before a plan was found that holds every limit.";
-    if (s->feasible && strcmp(s->outcome, "optimal") == 0)
+    const bool refined = strcmp(s->method, "blanket") != 0;
+    if (s->feasible && !refined)
+        what = "The blanket's own motion holds every limit. Nothing was refined.";
+    else if (s->feasible && strcmp(s->outcome, "optimal") == 0)
         what =
             "The plan holds every limit, and the last solve for its final shape converged: a local optimum.";
     else if (s->feasible)
         what = "The plan holds every limit. The last solve for its final shape ended before it converged.";
+    else if (s->check.feasible && strcmp(s->outcome, "stopped") != 0)
+        what = "The schedule holds every limit of the structure, but not all that the scene asks for.";
+    else if (strcmp(s->outcome, "stopped") != 0 && !refined)
+        what = "The blanket's own motion breaks a limit and must not be driven. Nothing was refined.";
     else if (strcmp(s->outcome, "stopped") != 0)
         what = "This plan breaks a limit and must not be driven. It is the best that was found.";
     morph_text_add(page, "<div class=\"outcome %s\">\n", s->feasible ? "good" : "bad");
