@@ -10,13 +10,13 @@ morph_refine_options morph_refine_defaults(void) {
     /* The insets leave room for the path's spline to approach the end from inside: a thousandth of a spacing,
      * and of a radian, changes the reachable shape by less than the links' radius. */
     return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
-                                  .cover_weight = 5.0,
+                                  .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.01,
                                   .press = 0.3,
                                   .reach = 0.3,
                                   .least_reach = 0.03,
                                   .hold = 1e-3,
-                                  .upright = 5e-4,
+                                  .upright = 2e-4,
                                   .rounds = 12};
 }
 
@@ -242,6 +242,7 @@ morph_status morph_refine(const morph_world *world, const morph_refine_options *
         morph_pose_bounds(world, options->inset.clearance, r.base);
         if (options->control) r.quiet = *options->control;
         r.quiet.log = NULL;
+        r.quiet.progress = NULL;
         status = rounds(&r);
     }
     if (r.have_best) {
