@@ -246,6 +246,23 @@ static morph_status smooth_poses(pather *p, double weight) {
     return status;
 }
 
+/* Poses from the end back to the start: each a step along the straight way from the pose after it to the
+ * start, moved inside its limits. Every step begins at a pose that holds, so this finds a way where the
+ * guide's poses, bent to the end, are too far from one. */
+static morph_status unfold_poses(pather *p) {
+    morph_status status = MORPH_OK;
+    for (int k = p->count - 2; k > 0 && status == MORPH_OK; k--) {
+        const double *from = pose(p, k + 1), *start = pose(p, 0);
+        for (int i = 0; i < p->coordinates; i++)
+            pose(p, k)[i] = from[i] + (start[i] - from[i]) / (k + 1);
+        p->s[k] = (double)k / (p->count - 1);
+        status = solve_pose(p, k);
+        morph_progress(p->options->control, "path", 0.7 * (1.0 - (double)k / p->count));
+        if (status == MORPH_OK && morph_stopped(p->options->control)) status = MORPH_ERR_STOPPED;
+    }
+    return status;
+}
+
 /* Poses by turns smoothed and moved inside their limits: both hold nearly at the end, the limits exactly. */
 static morph_status settle_poses(pather *p) {
     morph_status status = MORPH_OK;
@@ -265,7 +282,7 @@ static morph_status settle_poses(pather *p) {
 static morph_status run(pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
     set_parameters(p);
-    if (p->options->refine) status = settle_poses(p);
+    if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
     if (status == MORPH_OK) set_parameters(p);
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {
         breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);

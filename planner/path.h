@@ -12,6 +12,7 @@ typedef struct morph_path_options {
     morph_inset interior; /* the inset of poses far from the end: room for the spline between them */
     int intervals;        /* to begin with, at least 8 */
     int poses;            /* at most, after all insertions */
+    bool unfold;          /* poses stepped back from the end instead of taken from the guide */
     int sweeps;           /* of smoothing and moving inside the limits */
     double smoothness;    /* weight of second differences of poses beside the distance to the guide */
     double seconds;       /* wall; <= 0: none */

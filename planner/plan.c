@@ -93,30 +93,55 @@ static morph_status stage_refine(planner *p) {
     return status;
 }
 
-/* Frames of the guide in which nothing happens, at either end, are dropped: the fall before the first contact
- * keeps one. */
-static morph_status stage_path(planner *p) {
-    const double since = morph_seconds();
+/* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
+static morph_status try_path(planner *p, bool unfold, int intervals, double *least) {
     morph_path_options o = morph_path_defaults();
+    o.control = control_of(p);
+    o.refine = p->options->method != MORPH_METHOD_BLANKET && !p->stopped;
+    o.unfold = unfold;
+    o.intervals = intervals;
+    morph_curve *curve = NULL;
     morph_path_report r;
-    morph_status status = MORPH_OK;
-    for (int attempt = 0; attempt < 2; attempt++) {
-        o.control = control_of(p);
-        o.refine = p->options->method != MORPH_METHOD_BLANKET && !p->stopped;
-        if (!o.refine) o.intervals = 24;
-        morph_curve_destroy(p->curve);
-        p->curve = NULL;
-        status = morph_path_plan(&p->work.world, &p->nominal, p->work.start, p->end, &o, &p->curve, &r);
-        if (status != MORPH_ERR_STOPPED) break;
-        p->stopped = true;
-    }
+    const morph_status status =
+        morph_path_plan(&p->work.world, &p->nominal, p->work.start, p->end, &o, &curve, &r);
     morph_summary *s = &p->plan->summary;
-    s->iterations_path = r.effort.iterations;
-    s->unknowns_path = r.effort.unknowns;
-    s->rows_path_used = r.effort.rows;
-    s->rows_path_possible = r.rows_possible;
+    s->iterations_path += r.effort.iterations;
     s->linear_seconds += r.effort.linear_seconds;
     s->callback_seconds += r.effort.callback_seconds;
+    const double worst = morph_violation_worst(&r.violation, morph_pose_tolerance, NULL);
+    if (status == MORPH_OK && curve && (!p->curve || worst < *least)) {
+        morph_curve_destroy(p->curve);
+        p->curve = curve;
+        *least = worst;
+        s->unknowns_path = r.effort.unknowns;
+        s->rows_path_used = r.effort.rows;
+        s->rows_path_possible = r.rows_possible;
+    } else {
+        morph_curve_destroy(curve);
+    }
+    return status;
+}
+
+/* First stepped back from the end in few poses, then in more, last along the blanket's own way: the first
+ * that holds is taken. The pure blanket, and what is left after a stop, get their poses without a solve. */
+static morph_status stage_path(planner *p) {
+    static const struct {
+        bool unfold;
+        int intervals;
+    } ways[] = {{true, 12}, {true, 24}, {false, 16}};
+    const double since = morph_seconds();
+    double least = INFINITY;
+    morph_status status = MORPH_OK;
+    for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK; k++) {
+        if (p->options->method == MORPH_METHOD_BLANKET || p->stopped) break;
+        status = try_path(p, ways[k].unfold, ways[k].intervals, &least);
+        if (status == MORPH_ERR_STOPPED || morph_stopped(p->options->control)) {
+            p->stopped = true;
+            status = MORPH_OK;
+        }
+        if (p->curve && least <= 1.0) break;
+    }
+    if (status == MORPH_OK && !p->curve) status = try_path(p, false, 24, &least);
     note_time(p, MORPH_STAGE_PATH, since);
     return status;
 }

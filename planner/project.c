@@ -25,7 +25,7 @@ typedef struct projector {
     const morph_inset *inset;
     morph_active *active;
     morph_effort *effort;
-    double *reference, *lower;
+    double *reference, *base, *lower, *upper;
     int n;
     morph_control quiet; /* the caller's control without its log */
     bool solved;
@@ -38,7 +38,14 @@ static morph_status solve(projector *p, double *x) {
     morph_near_term near = {p->n, p->reference, 1.0};
     blocks[count++] = morph_block_near(&near, NULL);
     morph_nlp *nlp = NULL;
-    morph_status status = morph_nlp_create(p->n, x, p->lower, NULL, blocks, count, NULL, 0, &nlp);
+    /* A projection that would have to go further than this is not one; the bounds keep a failing solve from
+     * wandering off. */
+    const double reach = 1.0;
+    for (int i = 0; i < p->n; i++) {
+        p->lower[i] = fmax(p->base[i], p->reference[i] - reach);
+        p->upper[i] = fmax(p->base[i], p->reference[i]) + reach;
+    }
+    morph_status status = morph_nlp_create(p->n, x, p->lower, p->upper, blocks, count, NULL, 0, &nlp);
     if (status != MORPH_OK) return status;
     morph_nlp_result result = {0};
     morph_nlp_options o = morph_nlp_defaults();
@@ -70,11 +77,13 @@ morph_status morph_project(const morph_world *world, const morph_inset *inset, i
     p.quiet.log = NULL;
     p.quiet.progress = NULL;
     p.reference = morph_alloc((size_t)p.n, sizeof(double));
+    p.base = morph_alloc((size_t)p.n, sizeof(double));
     p.lower = morph_alloc((size_t)p.n, sizeof(double));
-    morph_status status = p.reference && p.lower ? MORPH_OK : MORPH_ERR_NOMEM;
+    p.upper = morph_alloc((size_t)p.n, sizeof(double));
+    morph_status status = p.reference && p.base && p.lower && p.upper ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
         memcpy(p.reference, x, (size_t)p.n * sizeof *x);
-        morph_pose_bounds(world, inset->clearance, p.lower);
+        morph_pose_bounds(world, inset->clearance, p.base);
         morph_active_clear(active, world->structure);
         status = morph_pose_examine(world, x, inset, &near, active, NULL, violation);
     }
@@ -86,6 +95,8 @@ morph_status morph_project(const morph_world *world, const morph_inset *inset, i
         if (morph_stopped(control)) break;
     }
     free(p.reference);
+    free(p.base);
     free(p.lower);
+    free(p.upper);
     return status;
 }
