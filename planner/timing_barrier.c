@@ -306,8 +306,7 @@ static double largest(const double *x, int n) {
     return most;
 }
 
-/* The barrier starts where a row at a tenth of its limit weighs like its share of the objective, and ends
- * where all rows together cost 1e-4 of the duration at most (1e-8 times some ten thousand of them; those that
+/* All rows together then cost 1e-4 of the duration at most (1e-8 times some ten thousand of them; those that
  * matter are some hundreds). */
 static const double last_mu = 1e-8;
 
@@ -320,7 +319,9 @@ morph_status morph_timing_barrier(const morph_timing_rows *rows, double mu, cons
     memcpy(b.x, x, (size_t)b.n * sizeof *x);
     b.mu = mu;
     start_multipliers(&b);
-    for (int k = 0; k < MOST_ITERATIONS && !*converged; k++) {
+    /* A start outside has no logarithms to lower: it stays as it is. */
+    const bool inside = isfinite(merit(&b, b.x));
+    for (int k = 0; k < MOST_ITERATIONS && inside && !*converged; k++) {
         if (morph_stopped(control)) {
             status = MORPH_ERR_STOPPED;
             break;
@@ -340,4 +341,19 @@ morph_status morph_timing_barrier(const morph_timing_rows *rows, double mu, cons
     memcpy(x, b.x, (size_t)b.n * sizeof *x);
     release(&b);
     return status;
+}
+
+morph_status morph_timing_merit(const morph_timing_rows *rows, double mu, const double *x, double *value,
+                                double *gradient) {
+    barrier b;
+    const morph_status status = allocate(rows, &b);
+    if (status != MORPH_OK) return status;
+    memcpy(b.x, x, (size_t)b.n * sizeof *x);
+    b.mu = mu;
+    start_multipliers(&b);
+    assemble(&b);
+    *value = merit(&b, x);
+    memcpy(gradient, b.gradient, (size_t)b.n * sizeof *gradient);
+    release(&b);
+    return MORPH_OK;
 }

@@ -10,10 +10,15 @@
 
 #include "planner/timing_rows.h"
 
-/* x (rows->basis.count): start, strictly within all rows, and result: the start or a faster one, within all
- * rows on the grid. *iterations is added to. MORPH_ERR_STOPPED after the control's stop, with x usable. mu:
- * the first barrier parameter. */
+/* x (rows->basis.count): start, strictly within all rows (one outside is left as it is), and result: the
+ * start or a faster one, within all rows on the grid. *iterations is added to. MORPH_ERR_STOPPED after the
+ * control's stop, with x usable. mu: the first barrier parameter. */
 morph_status morph_timing_barrier(const morph_timing_rows *rows, double mu, const morph_control *control,
                                   double *x, int *iterations, bool *converged);
+
+/* The merit that its steps lower, time - mu * sum of log c, and its gradient (rows->basis.count): for tests
+ * of the formulas. INFINITY outside the rows. */
+morph_status morph_timing_merit(const morph_timing_rows *rows, double mu, const double *x, double *merit,
+                                double *gradient);
 
 #endif

@@ -2,6 +2,7 @@
  * folder, rebuilds the path and times it. */
 #include "planner/folder.h"
 #include "planner/plan.h"
+#include "planner/timing_exact.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -52,6 +53,22 @@ static double evaluation(const morph_curve *curve, int order) {
     return least;
 }
 
+/* The fine grid, screened and complete: the same ratios at different cost. */
+static void fine_grid(const morph_curve *curve, const morph_timing *timing, double sample) {
+    morph_path_table table;
+    if (morph_path_table_create(curve, &table) != MORPH_OK) return;
+    const int steps = MORPH_TIMING_FINE * (int)lround(timing->duration / sample);
+    double screened[3] = {0}, complete[3];
+    const double begin = morph_seconds();
+    const morph_status status = morph_timing_fine(&table, timing, steps, screened);
+    const double middle = morph_seconds();
+    morph_timing_even(&table, timing, steps, complete);
+    printf("  %d fine points: screened %.3f s, complete %.3f s, ratios %.9f and %.9f%s\n", steps + 1,
+           middle - begin, morph_seconds() - middle, morph_timing_stretch(screened),
+           morph_timing_stretch(complete), status == MORPH_OK ? "" : " (failed)");
+    morph_path_table_free(&table);
+}
+
 static int run(const char *folder) {
     char file[4096], message[512] = "";
     snprintf(file, sizeof file, "%s/scene.yaml", folder);
@@ -76,6 +93,7 @@ static int run(const char *folder) {
                 "final stretch %.6f, ratios %.4f %.4f %.4f, took %.3f s\n",
                 timing.duration, r.smooth_duration, record.time[record.samples - 1], r.iterations, r.unknowns,
                 r.rows_used, r.stretch, r.worst_rate, r.worst_acceleration, r.worst_jerk, r.seconds);
+            fine_grid(curve, &timing, scene->sample);
             morph_timing_free(&timing);
         }
     } else {

@@ -7,7 +7,8 @@
 #include <cmocka.h>
 
 #include "planner/timing.h"
-#include "planner/timing_rows.h"
+#include "planner/timing_barrier.h"
+#include "planner/timing_exact.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -467,6 +468,106 @@ static void test_rows(void **state) {
     drop(&f);
 }
 
+/* The merit's gradient against central differences, inside the rows and with a large mu, so that every row
+ * counts; and INFINITY outside. */
+static void test_merit(void **state) {
+    (void)state;
+    const morph_structure_def def = small_grid(0.1);
+    fixture f = make(&def, (shape){wave, wave_late});
+    morph_path_table table;
+    morph_timing_report report;
+    morph_timing reference = solve(&f, 4.0, 0.01, &report);
+    assert_int_equal(morph_path_table_create(f.curve, &table), MORPH_OK);
+    morph_timing_rows rows;
+    assert_int_equal(morph_timing_rows_create(&table, &reference, 12, 5, &rows), MORPH_OK);
+    enum { N = 12 };
+    double x[N], gradient[N], other[N], value, left, right;
+    for (int i = 0; i < N; i++)
+        x[i] = 1.0 + 0.02 * sin(1.7 * i);
+    const double room = 0.8 * morph_timing_rows_room(&rows, x);
+    for (int i = 0; i < N; i++)
+        x[i] *= room;
+    const double mu = 0.01, h = 1e-6;
+    assert_int_equal(morph_timing_merit(&rows, mu, x, &value, gradient), MORPH_OK);
+    assert_true(isfinite(value));
+    for (int i = 0; i < N; i++) {
+        const double at = x[i];
+        x[i] = at - h;
+        morph_timing_merit(&rows, mu, x, &left, other);
+        x[i] = at + h;
+        morph_timing_merit(&rows, mu, x, &right, other);
+        x[i] = at;
+        assert_near(gradient[i], (right - left) / (2.0 * h), 1e-6 * (1.0 + fabs(gradient[i])));
+    }
+    for (int i = 0; i < N; i++)
+        x[i] /= 0.79;
+    morph_timing_merit(&rows, mu, x, &value, gradient);
+    assert_true(isinf(value));
+    morph_timing_rows_free(&rows);
+    morph_path_table_free(&table);
+    morph_timing_free(&reference);
+    drop(&f);
+}
+
+/* Posts that tilt and a grid that bends: many links with different lengths. At least one limit is used up all
+ * but for the last sample: otherwise the schedule wastes time. */
+static void test_bent(void **state) {
+    (void)state;
+    enum { BENT = 8 };
+    morph_structure_def def = morph_structure_defaults(0.1);
+    def.nodes[0] = def.nodes[1] = 4;
+    fixture f = {0};
+    assert_int_equal(morph_structure_create(&def, &f.structure), MORPH_OK);
+    const int width = 3 * f.structure->joints;
+    double s[BENT], *x = calloc((size_t)(BENT * width), sizeof *x);
+    assert_non_null(x);
+    for (int k = 0; k < BENT; k++) {
+        s[k] = k / (BENT - 1.0);
+        for (int i = 0; i < width; i += 3) {
+            const double *at = &f.structure->start[i];
+            const double bend = 8.0 * s[k] * s[k] * (at[0] * at[0] - 0.5 * at[1] * at[0]);
+            x[k * width + i] = at[0] * (1.0 + 0.1 * s[k]);
+            x[k * width + i + 1] = at[1] - 0.2 * bend * s[k];
+            x[k * width + i + 2] = at[2] - bend;
+        }
+    }
+    assert_int_equal(morph_curve_create(f.structure, s, x, BENT, &f.curve), MORPH_OK);
+    free(x);
+    morph_timing_report report;
+    morph_timing timing = solve(&f, 0.0, 0.001, &report);
+    const double used = fmax(report.worst_rate, fmax(report.worst_acceleration, report.worst_jerk));
+    assert_true(used > 0.99);
+    assert_true(timing.duration < report.smooth_duration);
+    hold_limits(&f, &timing, 0.001);
+    hold_exactly(&f, &timing, 0.001);
+    morph_timing_free(&timing);
+    drop(&f);
+}
+
+/* The screened fine grid finds what the complete one finds. */
+static void test_fine_grid(void **state) {
+    (void)state;
+    const morph_structure_def def = small_grid(0.1);
+    const shape shapes[] = {{wave, wave_late}, {corner_x, corner_y}, {linear, third}, {slowing, none}};
+    for (size_t n = 0; n < sizeof shapes / sizeof *shapes; n++) {
+        fixture f = make(&def, shapes[n]);
+        morph_path_table table;
+        morph_timing_report report;
+        morph_timing timing = solve(&f, 0.0, 0.001, &report);
+        assert_int_equal(morph_path_table_create(f.curve, &table), MORPH_OK);
+        double screened[3], complete[3];
+        for (int steps = 5000; steps <= 45000; steps += 20003) {
+            assert_int_equal(morph_timing_fine(&table, &timing, steps, screened), MORPH_OK);
+            morph_timing_even(&table, &timing, steps, complete);
+            for (int k = 0; k < 3; k++)
+                assert_near(screened[k], complete[k], 1e-12);
+        }
+        morph_path_table_free(&table);
+        morph_timing_free(&timing);
+        drop(&f);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_closed_form),  cmocka_unit_test(test_corner),
@@ -474,7 +575,8 @@ int main(void) {
         cmocka_unit_test(test_no_change),    cmocka_unit_test(test_scales),
         cmocka_unit_test(test_limits_scale), cmocka_unit_test(test_coarse_samples),
         cmocka_unit_test(test_repeats),      cmocka_unit_test(test_stop),
-        cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_rows),         cmocka_unit_test(test_merit),
+        cmocka_unit_test(test_bent),         cmocka_unit_test(test_fine_grid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
