@@ -85,7 +85,7 @@ typedef struct coarse {
     morph_path_table *table;
     const morph_timing *timing;
     int links, count; /* count: coarse intervals */
-    double step;
+    int stride, steps;
     double *ring[4];
     double (*bound)[3]; /* count */
 } coarse;
@@ -93,7 +93,8 @@ typedef struct coarse {
 static void coarse_pass(coarse *c, double worst[3]) {
     for (int i = 0; i <= c->count; i++) {
         double *now = c->ring[i & 3];
-        signed_ratios(c->table, c->timing, fmin(i * c->step, c->timing->duration), now);
+        const int fine = i * c->stride < c->steps ? i * c->stride : c->steps;
+        signed_ratios(c->table, c->timing, c->timing->duration * fine / c->steps, now);
         for (int k = 0; k < 3; k++)
             for (int n = k * c->links; n < (k + 1) * c->links; n++)
                 worst[k] = fmax(worst[k], fabs(now[n]));
@@ -116,7 +117,8 @@ morph_status morph_timing_fine(morph_path_table *table, const morph_timing *timi
         return MORPH_OK;
     }
     coarse c = {.table = table, .timing = timing, .links = table->curve->structure->links, .count = count};
-    c.step = timing->duration / steps * stride;
+    c.stride = stride;
+    c.steps = steps;
     double *ring = morph_alloc(4 * 3 * (size_t)c.links, sizeof *ring);
     c.bound = morph_alloc((size_t)count, sizeof *c.bound);
     if (ring && c.bound) {
