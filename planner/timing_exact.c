@@ -79,8 +79,8 @@ static void interval_bound(double *const q[4], int links, double bound[3]) {
     }
 }
 
-/* The ring of ratios at coarse times i - 1 .. i + 2; past an end the nearest inner time stands in, so that
- * the end's own second difference counts twice. */
+/* The ring of ratios at coarse times i - 1 .. i + 2. Past an end another time of the window stands in: its
+ * difference is of the first order, larger than the second, and the inner one is there too. */
 typedef struct coarse {
     morph_path_table *table;
     const morph_timing *timing;
@@ -100,7 +100,6 @@ static void coarse_pass(coarse *c, double worst[3]) {
                 worst[k] = fmax(worst[k], fabs(now[n]));
         if (i < 3) continue;
         double *const q[4] = {c->ring[(i - 3) & 3], c->ring[(i - 2) & 3], c->ring[(i - 1) & 3], now};
-        /* The outermost intervals take the bound of the window that holds them. */
         interval_bound(q, c->links, c->bound[i - 2]);
         double *const first[4] = {q[2], q[0], q[1], q[2]}, *const last[4] = {q[1], q[2], q[3], q[1]};
         if (i == 3) interval_bound(first, c->links, c->bound[0]);
