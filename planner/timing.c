@@ -1,10 +1,18 @@
 #include "planner/timing.h"
+#include "planner/timing_barrier.h"
+#include "planner/timing_exact.h"
 #include "planner/timing_rows.h"
+#include "solvers/dense.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { CONTROLS = 30, GRID = 120 };
+/* Grid points to a knot interval of w: peaks between them then stand out by a thousandth. Every third of them
+ * is a site of the spline in time, whose error is then beneath that. */
+enum { DENSITY = 12, EVERY = 3 };
+
+/* Beyond so many samples a reader's curve is ours to rounding. */
+static const double reader_samples = 200000.0;
 
 void morph_timing_free(morph_timing *t) {
     morph_basis_free(&t->basis);
@@ -34,178 +42,269 @@ void morph_timing_chain(int links, const double *by_s, const double s[4], double
     }
 }
 
-/* Worst ratios of rate, acceleration and jerk to their limits at one time, with the timing's duration. */
-static void ratios_at(morph_path_table *table, const morph_timing *timing, double t, double worst[3]) {
-    double s[4];
-    const morph_structure *st = table->curve->structure;
-    morph_timing_eval(timing, t, s);
-    morph_path_table_exact(table, s[0], 3);
-    morph_timing_chain(st->links, table->exact, s, table->by_time);
-    const double *limit[3] = {st->rate_limit, st->acceleration_limit, st->jerk_limit};
-    for (int k = 0; k < 3; k++)
-        for (int l = 0; l < st->links; l++)
-            worst[k] = fmax(worst[k], fabs(table->by_time[(k + 1) * st->links + l]) / limit[k][l]);
-}
-
-static double needed_stretch(const double worst[3]) {
-    return fmax(worst[0], fmax(sqrt(worst[1]), cbrt(worst[2])));
-}
-
-static double stretch_on_grid(morph_path_table *table, const morph_timing *timing, int steps,
-                              double worst[3]) {
-    worst[0] = worst[1] = worst[2] = 0.0;
-    for (int i = 0; i <= steps; i++)
-        ratios_at(table, timing, timing->duration * i / steps, worst);
-    return needed_stretch(worst);
-}
-
-/* Control points of the quintic rest-to-rest profile 10 x^3 - 15 x^4 + 6 x^5: a quintic, so the spline holds
- * it exactly; its control points are its blossom at five successive inner knots, and the blossom of x^p is
- * the elementary symmetric polynomial of degree p over C(5, p). */
-static void smooth_controls(const morph_basis *b, double *control) {
-    for (int j = 0; j < b->count; j++) {
-        double e[MORPH_SPLINE_ORDER] = {1.0};
-        for (int k = 1; k <= MORPH_SPLINE_DEGREE; k++)
-            for (int p = k; p > 0; p--)
-                e[p] += e[p - 1] * b->knot[j + k];
-        control[j] = 10.0 * e[3] / 10.0 - 15.0 * e[4] / 5.0 + 6.0 * e[5];
-    }
-}
-
-static morph_status start_profile(morph_path_table *table, morph_timing *timing, double *smooth) {
-    morph_status status = morph_basis_uniform(CONTROLS, &timing->basis);
+/* The quintic rest-to-rest profile 10 x^3 - 15 x^4 + 6 x^5 in Bernstein's form: its control points are 0, 0,
+ * 0, 1, 1, 1. */
+static morph_status smooth_profile(morph_timing *out) {
+    *out = (morph_timing){.duration = 1.0};
+    const morph_status status = morph_basis_uniform(MORPH_SPLINE_ORDER, &out->basis);
     if (status != MORPH_OK) return status;
-    timing->control = morph_alloc(CONTROLS, sizeof(double));
-    if (!timing->control) return MORPH_ERR_NOMEM;
-    smooth_controls(&timing->basis, timing->control);
-    timing->duration = 1.0;
-    double worst[3];
-    timing->duration = stretch_on_grid(table, timing, 4 * GRID, worst);
-    /* A path on which no length changes needs no time: one second keeps the division finite. */
-    if (!(timing->duration > 0.0)) timing->duration = 1e-3;
-    *smooth = timing->duration;
+    out->control = morph_alloc(MORPH_SPLINE_ORDER, sizeof(double));
+    if (!out->control) {
+        morph_timing_free(out);
+        return MORPH_ERR_NOMEM;
+    }
+    for (int i = MORPH_SPLINE_ORDER / 2; i < MORPH_SPLINE_ORDER; i++)
+        out->control[i] = 1.0;
     return MORPH_OK;
 }
 
-/* One NLP over control points and u with the rows that stand near their limits at the present profile. */
-static morph_status improve(morph_path_table *table, const morph_timing_options *o, morph_timing *timing,
-                            morph_timing_report *report) {
-    morph_timing_rows rows;
-    morph_status status = morph_timing_rows_create(table, timing, GRID, &rows);
-    double *x = morph_alloc((size_t)CONTROLS + 1, sizeof(double));
-    double *lower = morph_alloc((size_t)CONTROLS + 1, sizeof(double));
-    double *upper = morph_alloc((size_t)CONTROLS + 1, sizeof(double));
-    if (status == MORPH_OK && (!x || !lower || !upper)) status = MORPH_ERR_NOMEM;
-    morph_nlp *nlp = NULL;
-    morph_nlp_result result = {0};
-    if (status == MORPH_OK) {
-        for (int j = 0; j < CONTROLS; j++) {
-            x[j] = timing->control[j];
-            /* s = s' = s'' = 0 at an end of a clamped spline: its three outer control points are equal. */
-            lower[j] = j >= CONTROLS - 3 ? 1.0 : 0.0;
-            upper[j] = j < 3 ? 0.0 : 1.0;
+/* w at any theta. */
+static double w_at(const morph_timing_rows *rows, const double *x, double theta) {
+    double value[1][MORPH_SPLINE_ORDER], w = 0.0;
+    const int first = morph_basis_eval(&rows->basis, theta, 0, value);
+    for (int i = 0; i < MORPH_SPLINE_ORDER; i++)
+        w += value[0][i] * x[first + i];
+    return w;
+}
+
+/* Time at each grid point, in units of the reference's duration: the integral of w^(-1/2) by Gauss's rule of
+ * four points on every interval. */
+static void integrate_time(const morph_timing_rows *rows, const double *x, double *time) {
+    static const double node[2] = {0.33998104358485626, 0.86113631159405258},
+                        weight[2] = {0.65214515486254614, 0.34785484513745386};
+    time[0] = 0.0;
+    for (int g = 0; g + 1 < rows->points; g++) {
+        const double half = 0.5 * (rows->theta[g + 1] - rows->theta[g]), middle = rows->theta[g] + half;
+        double sum = 0.0;
+        for (int k = 0; k < 2; k++)
+            for (int sign = -1; sign <= 1; sign += 2)
+                sum += weight[k] / sqrt(w_at(rows, x, middle + sign * node[k] * half));
+        time[g + 1] = time[g] + half * sum;
+    }
+}
+
+/* Knots for s(tau) through the inner sites tau[1..count-2] with s, s', s'' given at both ends: de Boor's
+ * averages of the sites with each end counted three times, as for any Hermite data. */
+static void profile_knots(const double *tau, int count, morph_basis *basis) {
+    const int n = basis->count;
+    for (int i = 0; i < MORPH_SPLINE_ORDER; i++) {
+        basis->knot[i] = 0.0;
+        basis->knot[n + i] = 1.0;
+    }
+    for (int j = 1; j < n - MORPH_SPLINE_DEGREE; j++) {
+        double sum = 0.0;
+        for (int i = j; i < j + MORPH_SPLINE_DEGREE; i++)
+            sum += i < 3 ? 0.0 : i - 2 >= count - 1 ? 1.0 : tau[i - 2];
+        basis->knot[MORPH_SPLINE_DEGREE + j] = sum / MORPH_SPLINE_DEGREE;
+    }
+}
+
+/* Control points 3 .. n - 4 by interpolation; those before are 0 and those after 1. s' = s'' = 0 at a clamped
+ * end is three equal control points. */
+static morph_status interpolate(const double *tau, const double *s, int count, morph_timing *out) {
+    const int inner = count - 2, n = inner + 6;
+    morph_status status = morph_basis_uniform(n, &out->basis);
+    if (status != MORPH_OK) return status;
+    profile_knots(tau, count, &out->basis);
+    out->control = morph_alloc((size_t)n, sizeof(double));
+    double *matrix = morph_alloc((size_t)inner * (size_t)inner, sizeof(double));
+    if (!out->control || !matrix) {
+        free(matrix);
+        return MORPH_ERR_NOMEM;
+    }
+    for (int k = 0; k < inner; k++) {
+        double value[1][MORPH_SPLINE_ORDER], rest = s[k + 1];
+        const int first = morph_basis_eval(&out->basis, tau[k + 1], 0, value);
+        for (int i = 0; i < MORPH_SPLINE_ORDER; i++) {
+            const int unknown = first + i - 3;
+            if (unknown >= inner) rest -= value[0][i];
+            if (unknown >= 0 && unknown < inner)
+                matrix[(size_t)k * (size_t)inner + (size_t)unknown] = value[0][i];
         }
-        x[CONTROLS] = 1.0; /* u in units of the present one */
-        lower[CONTROLS] = 0.1;
-        upper[CONTROLS] = 100.0;
-        char message[256] = "";
-        morph_block blocks[3];
-        const int count = morph_timing_rows_blocks(&rows, blocks);
-        status =
-            morph_nlp_create(CONTROLS + 1, x, lower, upper, blocks, count, message, sizeof message, &nlp);
+        out->control[k + 3] = rest;
     }
+    status = morph_dense_solve(matrix, inner, out->control + 3, 1);
+    for (int i = 0; i < 3; i++)
+        out->control[n - 1 - i] = 1.0;
+    free(matrix);
+    return status;
+}
+
+/* The profile of w over a reference as a spline in time; its duration is not yet stretched. */
+static morph_status profile_of(const morph_timing_rows *rows, const morph_timing *reference, const double *x,
+                               morph_timing *out) {
+    const int count = (rows->points - 1) / EVERY + 1;
+    *out = (morph_timing){0};
+    double *tau = morph_alloc((size_t)rows->points, sizeof(double)),
+           *s = morph_alloc((size_t)count, sizeof(double));
+    morph_status status = tau && s ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
-        morph_nlp_options n = morph_nlp_defaults();
-        /* 1e-5 of the duration is far beneath a sample. */
-        n.tolerance = 1e-5;
-        n.max_iterations = 200;
-        n.control = o->control;
-        status = morph_nlp_solve(nlp, x, &n, &result);
+        integrate_time(rows, x, tau);
+        const double total = tau[rows->points - 1];
+        for (int g = 0; g < count; g++) {
+            double at[4];
+            tau[g] = tau[g * EVERY] / total;
+            morph_timing_eval(reference, rows->theta[g * EVERY] * reference->duration, at);
+            s[g] = at[0];
+        }
+        status = interpolate(tau, s, count, out);
+        out->duration = reference->duration * total;
     }
+    free(tau);
+    free(s);
+    if (status != MORPH_OK) morph_timing_free(out);
+    return status;
+}
+
+/* Solves with the rows at hand, takes in those that the result breaks, and so on: few are missing. x starts
+ * and ends strictly within every limit on the grid. */
+static morph_status fastest(morph_path_table *table, const morph_timing *reference, morph_timing_rows *rows,
+                            const morph_control *control, double *x, morph_timing_report *report) {
+    morph_status status = MORPH_OK;
+    const int n = rows->basis.count;
+    double mu = 1e-4;
+    for (int pass = 0; pass < 6; pass++) {
+        bool converged;
+        int added;
+        /* A tenth off every limit: the start must stand inside. */
+        const double room = 0.9 * morph_timing_rows_room(rows, x);
+        for (int j = 0; j < n; j++)
+            x[j] = fmin(0.99 * rows->upper, fmax(1.01 * rows->lower, room * x[j]));
+        status = morph_timing_barrier(rows, mu, control, x, &report->iterations, &converged);
+        report->outcome = converged ? MORPH_OPTIMAL : MORPH_FEASIBLE;
+        if (status != MORPH_OK) break;
+        status = morph_timing_rows_extend(table, reference, rows, x, &added);
+        if (status != MORPH_OK || added == 0) break;
+        mu = 1e-5;
+    }
+    return status;
+}
+
+/* One round: the fastest w over the present profile as reference, back to a spline in time, stretched by what
+ * stands between grid points. */
+static morph_status improve(morph_path_table *table, const morph_timing_options *o, int controls,
+                            const morph_timing *reference, morph_timing *out, morph_timing_report *report) {
+    morph_timing_rows rows;
+    *out = (morph_timing){0};
+    morph_status status = morph_timing_rows_create(table, reference, controls, DENSITY, &rows);
+    if (status != MORPH_OK) return status;
+    double *x = morph_alloc((size_t)controls, sizeof(double));
+    if (!x) status = MORPH_ERR_NOMEM;
+    for (int j = 0; j < controls && x; j++)
+        x[j] = 1.0;
+    if (status == MORPH_OK) status = fastest(table, reference, &rows, o->control, x, report);
+    /* After a stop x is still a profile, faster than the start as a rule. */
+    if (status == MORPH_OK || status == MORPH_ERR_STOPPED) status = profile_of(&rows, reference, x, out);
     if (status == MORPH_OK) {
-        report->iterations += result.iterations;
-        report->unknowns = result.unknowns;
-        report->rows_used = result.rows;
-        report->linear_seconds += result.linear_seconds;
-        report->outcome = result.outcome;
-        memcpy(timing->control, result.x, CONTROLS * sizeof *x);
-        timing->duration /= result.x[CONTROLS];
+        double worst[3];
+        morph_timing_even(table, out, 2 * rows.points, worst);
+        const double planned = out->duration, stretch = morph_timing_stretch(worst);
+        out->duration *= stretch;
+        report->unknowns = controls;
+        report->rows_used = 2 * controls + rows.points + 4 * rows.begin[rows.points];
+        report->rows_possible = 2 * controls + rows.points + 4 * rows.points * rows.links;
+        morph_log(o->control, "timing: %d control points, %d rows, %s: %.4f s, stretched by %.6f", controls,
+                  report->rows_used, morph_outcome_text(report->outcome), planned, stretch);
     }
-    morph_nlp_result_free(&result);
-    morph_nlp_destroy(nlp);
     morph_timing_rows_free(&rows);
     free(x);
-    free(lower);
-    free(upper);
     return status;
 }
 
-/* Rounds: rows are chosen at the profile of the round before; the best profile (after its own exact stretch)
- * is kept. */
+/* Each round has the best profile so far as reference; the first, coarse one only brings the knots to where
+ * time is spent. A profile that is not faster is dropped. */
 static morph_status rounds(morph_path_table *table, const morph_timing_options *o, morph_timing *timing,
                            morph_timing_report *report) {
-    double *best = morph_alloc(CONTROLS, sizeof(double));
-    if (!best) return MORPH_ERR_NOMEM;
-    memcpy(best, timing->control, CONTROLS * sizeof *best);
-    double shortest = timing->duration;
-    morph_status status = MORPH_OK;
-    for (int round = 0; round < 6 && status == MORPH_OK; round++) {
-        const double before = timing->duration;
-        status = improve(table, o, timing, report);
-        if (status != MORPH_OK) break;
-        double worst[3];
-        const double stretch = stretch_on_grid(table, timing, 4 * GRID, worst);
-        timing->duration *= stretch;
-        morph_log(o->control, "timing: round %d: %s, %.4f s (stretch %.6f, rows %d)", round + 1,
-                  morph_outcome_text(report->outcome), timing->duration, stretch, report->rows_used);
-        const bool gained = timing->duration < (1.0 - 1e-3) * shortest;
-        if (timing->duration < shortest) {
-            shortest = timing->duration;
-            memcpy(best, timing->control, CONTROLS * sizeof *best);
+    static const int controls[] = {32, 64, 64, 64};
+    for (size_t k = 0; k < sizeof controls / sizeof *controls && !morph_stopped(o->control); k++) {
+        morph_timing next;
+        morph_progress(o->control, "timing", (double)(k + 1) / 6.0);
+        const morph_status status = improve(table, o, controls[k], timing, &next, report);
+        if (status != MORPH_OK) return status;
+        const double gain = 1.0 - next.duration / timing->duration;
+        if (gain > 0.0) {
+            morph_timing_free(timing);
+            *timing = next;
+        } else {
+            morph_timing_free(&next);
         }
-        if (!gained && timing->duration < 1.02 * before) break;
-        if (morph_stopped(o->control)) break;
+        /* On a reference that is this close already, another round has gained a thousandth at most. */
+        if (k > 0 && gain < 0.06) break;
     }
-    memcpy(timing->control, best, CONTROLS * sizeof *best);
-    timing->duration = shortest;
-    free(best);
-    return status;
+    return MORPH_OK;
 }
 
-/* The exact stretch on a grid 10 times finer than the samples, then up to a whole number of samples. The
- * reader of a schedule rebuilds the curve from samples of length, rate and acceleration: its third derivative
- * differs from ours by the sampling error, of order sample^2 times the fifth derivative; a thousandth of the
- * jerk limit (a three-thousandth of the duration) covers it. */
-static void finish(morph_path_table *table, const morph_timing_options *o, morph_timing *timing,
-                   morph_timing_report *report) {
-    const double safety = 1.0 + 5e-4;
-    double worst[3];
-    const double estimate = fmax(timing->duration, o->duration) / o->sample;
-    /* Beyond 200,000 points the spacing is far beneath anything the spline can hide. */
-    const int steps = (int)fmin(200000.0, fmax(1000.0, 10.0 * ceil(estimate)));
-    report->stretch = stretch_on_grid(table, timing, steps, worst) * safety;
-    report->needed = timing->duration * report->stretch;
-    const double wanted = fmax(report->needed, o->duration);
-    const double samples = fmax(1.0, ceil(wanted / o->sample - 1e-9));
-    /* Stretching by f divides rates by f, accelerations by f^2, jerks by f^3 at the same points: no second
-     * pass. */
-    const double f = samples * o->sample / timing->duration;
-    timing->duration = samples * o->sample;
+/* Fine grid points to a duration: beyond 200,000 their spacing is far beneath anything the spline can hide.
+ */
+static int fine_steps(double samples) {
+    return (int)fmin(200000.0, fmax(1000.0, MORPH_TIMING_FINE * samples));
+}
+
+/* Whole samples, at least so many; the sum of rounding in the division is far beneath 1e-9. */
+static double whole_samples(double duration, double sample) {
+    return fmax(1.0, ceil(duration / sample - 1e-9));
+}
+
+/* The exact stretch on a grid 10 times finer than the samples, then up to a whole number of samples; then as
+ * much longer as the curve asks that a reader rebuilds from the samples. Its derivatives differ from ours by
+ * the sampling error, which falls with a power of sample / duration: a few steps settle it. */
+static morph_status finish(morph_path_table *table, const morph_timing_options *o, morph_timing *timing,
+                           morph_timing_report *report) {
+    const double planned = timing->duration;
+    double worst[3], read[3];
+    const int steps = fine_steps(ceil(fmax(planned, o->duration) / o->sample));
+    morph_status status = morph_timing_fine(table, timing, steps, worst);
+    if (status != MORPH_OK) return status;
+    /* A millionth over the exact stretch: rounding of the third derivatives. */
+    report->stretch = morph_timing_stretch(worst) * (1.0 + 1e-6);
+    report->needed = planned * report->stretch;
+    double samples = whole_samples(fmax(report->needed, o->duration), o->sample);
+    for (int k = 0; k < 40; k++) {
+        timing->duration = samples * o->sample;
+        if (samples > reader_samples) break;
+        status = morph_timing_reader(table, timing, (int)samples, read);
+        const double more = morph_timing_stretch(read);
+        if (status != MORPH_OK || more <= 1.0) break;
+        samples = fmax(samples + 1.0, ceil(samples * fmin(2.0, more)));
+        report->needed = samples * o->sample;
+    }
+    const double f = timing->duration / planned;
     report->worst_rate = worst[0] / f;
     report->worst_acceleration = worst[1] / (f * f);
     report->worst_jerk = worst[2] / (f * f * f);
+    return status;
+}
+
+/* The quintic profile, as fast as it may be. */
+static morph_status start_profile(morph_path_table *table, morph_timing *timing,
+                                  morph_timing_report *report) {
+    const morph_status status = smooth_profile(timing);
+    if (status != MORPH_OK) return status;
+    double worst[3];
+    morph_timing_even(table, timing, 480, worst);
+    timing->duration = morph_timing_stretch(worst);
+    report->smooth_duration = timing->duration;
+    report->outcome = MORPH_FEASIBLE;
+    return MORPH_OK;
 }
 
 morph_status morph_timing_solve(const morph_curve *curve, const morph_timing_options *options,
                                 morph_timing *timing, morph_timing_report *report) {
     const double started = morph_seconds();
     *timing = (morph_timing){0};
-    *report = (morph_timing_report){.rows_possible = 3 * curve->structure->links * (GRID + 1)};
+    *report = (morph_timing_report){0};
     morph_path_table table;
     morph_status status = morph_path_table_create(curve, &table);
-    if (status == MORPH_OK) status = start_profile(&table, timing, &report->smooth_duration);
-    if (status == MORPH_OK) status = rounds(&table, options, timing, report);
-    if (status == MORPH_OK) finish(&table, options, timing, report);
+    if (status == MORPH_OK) status = start_profile(&table, timing, report);
+    if (status == MORPH_OK) {
+        if (timing->duration > 0.0) {
+            status = rounds(&table, options, timing, report);
+        } else {
+            /* No length changes: a thousandth of a second keeps the division finite. */
+            timing->duration = 1e-3;
+        }
+    }
+    if (status == MORPH_OK) status = finish(&table, options, timing, report);
     morph_path_table_free(&table);
     if (status != MORPH_OK) morph_timing_free(timing);
     report->seconds = morph_seconds() - started;

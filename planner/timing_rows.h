@@ -1,4 +1,15 @@
-/* Rows of the timing NLP and the length derivatives along the path that they need. */
+/* The limits of every link along the path as rows in one unknown function, and the length derivatives they
+ * need.
+ *
+ * A reference profile s = sigma(theta), theta in [0, 1], runs from rest to rest with s growing like theta^3
+ * at both ends. Every other profile is theta(t), and its unknown is w = (dtheta/dt)^2 over theta, in units of
+ * 1 / D^2 (D: the reference's duration), so that w = 1 is the reference itself. With M(theta) = L(sigma(
+ * theta)), primes by theta, theta'' = w'/2 and theta''' = sqrt(w) w''/2 (of time):
+ *     rate          |M'| sqrt(w)                                   <= V D
+ *     acceleration  |M'' w + M' w'/2|                              <= A D^2       linear in w
+ *     jerk          |M''' w + 3/2 M'' w' + 1/2 M' w''| sqrt(w)     <= J D^3
+ * and the time is D times the integral of w^(-1/2). All of M is known beforehand, on a fixed grid. Because
+ * sigma takes the cubic start, w is positive and smooth at rest too (as a function of s it would not be). */
 #ifndef MORPH_TIMING_ROWS_H
 #define MORPH_TIMING_ROWS_H
 
@@ -16,32 +27,37 @@ void morph_path_table_free(morph_path_table *table);
 /* Fills table->exact at s with derivatives 0..order (at most 5). */
 void morph_path_table_exact(morph_path_table *table, double s, int order);
 
-/* One row: kind 0 rate, 1 acceleration, 2 jerk of a link at a grid time. */
-typedef struct morph_timing_row {
-    int point, link, kind;
-} morph_timing_row;
-
 typedef struct morph_timing_rows {
-    morph_path_table *table;
-    const morph_basis *basis;
-    double duration; /* of u = 1 */
-    int points;
+    morph_basis basis; /* of w(theta) */
+    int points, links;
+    double *theta;                          /* points: even from 0 to 1 */
+    double *share;                          /* points: weights of the integral, sum 1 */
     int *first;                             /* points: first control point */
-    double (*value)[4][MORPH_SPLINE_ORDER]; /* points: basis values and derivatives */
-    int count;
-    morph_timing_row *row;
-    double *lower, *upper;           /* count */
-    double *step_lower, *step_upper; /* controls - 1 */
-    double *lengths;                 /* points x 6 x links: derivatives at the last x */
-    double *at;                      /* points: parameter where lengths stand */
-    int controls;
+    double (*value)[3][MORPH_SPLINE_ORDER]; /* points: basis values and first two derivatives */
+    double *rate;        /* points: square of the worst link's |M'| / (V D): w times this is at most 1 */
+    bool *kept;          /* points x links: whose rows are in use */
+    int *begin;          /* points + 1: each point's span of `link` rows */
+    double (*link)[5];   /* rows: acceleration by (w, w'), jerk by (w, w', w''), over their limits */
+    int capacity;        /* of link */
+    double (*all)[5];    /* links: scratch, the rows of one point */
+    double lower, upper; /* of w's control points */
 } morph_timing_rows;
 
-/* Rows near their limits (within `0.7` of them) at the present profile on grid + 1 evenly spaced times. */
-morph_status morph_timing_rows_create(morph_path_table *table, const morph_timing *timing, int grid,
-                                      morph_timing_rows *out);
+/* Rows around a reference profile with `controls` (>= 6) control points for w and `density` grid points to
+ * each of its knot intervals. */
+morph_status morph_timing_rows_create(morph_path_table *table, const morph_timing *reference, int controls,
+                                      int density, morph_timing_rows *out);
+/* Evaluates every link at every grid point again and takes in those that break their limits at x by more than
+ * a thousandth (x NULL: the corners in some directions); *added counts them. */
+morph_status morph_timing_rows_extend(morph_path_table *table, const morph_timing *reference,
+                                      morph_timing_rows *rows, const double *x, int *added);
 void morph_timing_rows_free(morph_timing_rows *rows);
-/* Limits, monotony of the control points, and the objective -u. Returns the number of blocks (2 or 3). */
-int morph_timing_rows_blocks(morph_timing_rows *rows, morph_block out[3]);
+
+/* w, w', w'' at a grid point from control points x. */
+void morph_timing_rows_at(const morph_timing_rows *rows, int point, const double *x, double w[3]);
+
+/* The largest factor that w may be multiplied by with every row on the grid still held: rate and acceleration
+ * grow with it, jerk with its power 3/2. */
+double morph_timing_rows_room(const morph_timing_rows *rows, const double *x);
 
 #endif

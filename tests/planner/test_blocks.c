@@ -1,7 +1,6 @@
 /* Every block of a pose against central differences, at random poses and where contacts, limits and kinks are
  * near. */
 #include "planner/blocks.h"
-#include "planner/timing_rows.h"
 #include "tests/support/shapes.h"
 
 #include <setjmp.h>
@@ -186,62 +185,12 @@ static void cavity_terms(void **state) {
     free(metres);
 }
 
-/* The timing rows on a curve of eight bent poses. */
-static void timing_rows(void **state) {
-    fixture *f = *state;
-    enum { POSES = 8 };
-    double s[POSES], *joints = calloc(POSES * (size_t)f->n, sizeof(double));
-    assert_non_null(joints);
-    for (int k = 0; k < POSES; k++) {
-        s[k] = (double)k / (POSES - 1);
-        for (int j = 0; j < f->structure->joints; j++) {
-            const double *at = &f->structure->start[3 * j];
-            const double bend = 0.8 * s[k] * s[k] * (at[0] * at[0] - 0.5 * at[1] * at[0]) / 0.1;
-            const double p[3] = {at[0] * (1.0 + 0.1 * s[k]), at[1] - 0.2 * bend * s[k], at[2] - bend};
-            memcpy(&joints[k * f->n + 3 * j], p, sizeof p);
-        }
-    }
-    morph_curve *curve = NULL;
-    assert_int_equal(morph_curve_create(f->structure, s, joints, POSES, &curve), MORPH_OK);
-    const morph_timing_options options = {.sample = 0.001};
-    morph_timing timing;
-    morph_timing_report report;
-    assert_int_equal(morph_timing_solve(curve, &options, &timing, &report), MORPH_OK);
-    morph_path_table table;
-    assert_int_equal(morph_path_table_create(curve, &table), MORPH_OK);
-    morph_timing_rows rows;
-    assert_int_equal(morph_timing_rows_create(&table, &timing, 20, &rows), MORPH_OK);
-    morph_block blocks[3];
-    assert_int_equal(morph_timing_rows_blocks(&rows, blocks), 3);
-    double x[64];
-    assert_true(rows.controls < 63);
-    for (int j = 0; j < rows.controls; j++)
-        x[j] = 0.005 + 0.99 * timing.control[j]; /* off the ends, where the parameter is clamped and
-                                                    differences see a kink */
-    x[rows.controls] = 0.97;
-    morph_derivative_check check;
-    /* The rows hold third derivatives of s by tau, large numbers: a larger step keeps rounding down. */
-    assert_int_equal(morph_check_derivatives(blocks, 3, x, rows.controls + 1, 1e-6, 1e-5, &check), MORPH_OK);
-    if (!check.passed) print_error("%s\n", check.message);
-    assert_true(check.passed);
-    assert_true(report.worst_rate <= 1.0 && report.worst_acceleration <= 1.0 && report.worst_jerk <= 1.0);
-    /* At least one limit is used up: otherwise the schedule wastes time. */
-    assert_true(fmax(report.worst_rate, fmax(report.worst_acceleration, report.worst_jerk)) > 0.98);
-    assert_true(timing.duration < report.smooth_duration);
-    morph_timing_rows_free(&rows);
-    morph_path_table_free(&table);
-    morph_timing_free(&timing);
-    morph_curve_destroy(curve);
-    free(joints);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(members, setup, teardown),
         cmocka_unit_test_setup_teardown(angles, setup, teardown),
         cmocka_unit_test_setup_teardown(contact, setup, teardown),
         cmocka_unit_test_setup_teardown(cavity_terms, setup, teardown),
-        cmocka_unit_test_setup_teardown(timing_rows, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
