@@ -25,7 +25,7 @@ build_and_test() {
     cmake -S . -B "$1" -G Ninja -DCMAKE_BUILD_TYPE="$2" -DMORPH_WERROR=ON >"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
     cmake --build "$1" >>"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
     echo "Built $1 ($2)"
-    ctest --test-dir "$1" --output-on-failure -j 2
+    ctest --test-dir "$1" --output-on-failure --no-tests=error -j 2
 }
 
 build_and_test build-sanitize Sanitize
