@@ -45,7 +45,7 @@ typedef struct morph_measure {
 } morph_measure;
 
 /* Weight w_c of the target's term in the objective. */
-#define MORPH_COVER_WEIGHT 1.0
+#define MORPH_COVER_WEIGHT 5.0
 
 /* x: 3*joints. Exact distances throughout. Without exposed points gap_target is 0 and coverage 1.
  * MORPH_ERR_NONFINITE if x is not finite. */

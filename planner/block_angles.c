@@ -69,9 +69,11 @@ static morph_status angles_value(void *data, const double *x, double *f) {
     return MORPH_OK;
 }
 
-static void put_gradient(morph_sink *sink, int row, const directions *d, const int uj[2], const int vj[2]) {
+static void put_gradient(morph_sink *sink, int row, const directions *d, const int uj[2], const int vj[2],
+                         double scale) {
     for (int k = 0; k < 3; k++) {
-        const double gu = (d->v[k] - d->c * d->u[k]) / d->nu, gv = (d->u[k] - d->c * d->v[k]) / d->nv;
+        const double gu = scale * (d->v[k] - d->c * d->u[k]) / d->nu;
+        const double gv = scale * (d->u[k] - d->c * d->v[k]) / d->nv;
         morph_sink_jacobian(sink, row, 3 * uj[1] + k, gu);
         morph_sink_jacobian(sink, row, 3 * uj[0] + k, -gu);
         morph_sink_jacobian(sink, row, 3 * vj[1] + k, gv);
@@ -98,10 +100,8 @@ static void hessian_uv(const directions *d, double h[6][6]) {
 
 /* u and v are signed differences of joints: every ordered pair of their coordinates is visited and the lower
  * triangle kept, so that joints shared by u and v add up rightly. */
-static void put_hessian(morph_sink *sink, const directions *d, const int uj[2], const int vj[2],
-                        double weight) {
-    double h[6][6];
-    hessian_uv(d, h);
+static void put_signed_hessian(morph_sink *sink, const double h[6][6], const int uj[2], const int vj[2],
+                               double weight) {
     const int joint[4] = {uj[0], uj[1], vj[0], vj[1]};
     const double sign[4] = {-1.0, 1.0, -1.0, 1.0};
     for (int a = 0; a < 4; a++)
@@ -115,13 +115,20 @@ static void put_hessian(morph_sink *sink, const directions *d, const int uj[2], 
                 }
 }
 
+static void put_hessian(morph_sink *sink, const directions *d, const int uj[2], const int vj[2],
+                        double weight) {
+    double h[6][6];
+    hessian_uv(d, h);
+    put_signed_hessian(sink, (const double(*)[6])h, uj, vj, weight);
+}
+
 static morph_status angles_walk(void *data, const double *x, const double *weight, morph_sink *sink) {
     const morph_angle_rows *rows = data;
     for (int r = 0; r < rows->count; r++) {
         int uj[2], vj[2];
         morph_angle_joints(rows->structure, rows->tuple[r], uj, vj);
         const directions d = directions_at(x, uj, vj);
-        if (morph_sink_wants_jacobian(sink)) put_gradient(sink, r, &d, uj, vj);
+        if (morph_sink_wants_jacobian(sink)) put_gradient(sink, r, &d, uj, vj, 1.0);
         if (morph_sink_wants_hessian(sink)) put_hessian(sink, &d, uj, vj, weight[r]);
     }
     return MORPH_OK;
@@ -150,4 +157,53 @@ morph_block morph_block_angles(morph_angle_rows *data, const int *unknown, doubl
                          .value = angles_value,
                          .walk = angles_walk,
                          .describe = angles_describe};
+}
+
+static morph_status upright_value(void *data, const double *x, double *f) {
+    const morph_upright_term *d = data;
+    f[0] = 0.0;
+    for (int t = 0; t < d->structure->link_posts; t++) {
+        int uj[2], vj[2];
+        morph_link_post_joints(d->structure, t, uj, vj);
+        const double c = directions_at(x, uj, vj).c;
+        f[0] += d->scale * c * c;
+    }
+    return MORPH_OK;
+}
+
+/* c^2: gradient 2c grad c, Hessian 2c hess c + 2 grad c grad c^T; by (u, v), then through the signed joints.
+ */
+static void put_square_hessian(morph_sink *sink, const directions *d, const int uj[2], const int vj[2],
+                               double weight) {
+    double h[6][6], g[6];
+    hessian_uv(d, h);
+    for (int k = 0; k < 3; k++) {
+        g[k] = (d->v[k] - d->c * d->u[k]) / d->nu;
+        g[3 + k] = (d->u[k] - d->c * d->v[k]) / d->nv;
+    }
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            h[i][j] = 2.0 * (d->c * h[i][j] + g[i] * g[j]);
+    put_signed_hessian(sink, (const double(*)[6])h, uj, vj, weight);
+}
+
+static morph_status upright_walk(void *data, const double *x, const double *weight, morph_sink *sink) {
+    const morph_upright_term *term = data;
+    for (int t = 0; t < term->structure->link_posts; t++) {
+        int uj[2], vj[2];
+        morph_link_post_joints(term->structure, t, uj, vj);
+        const directions d = directions_at(x, uj, vj);
+        if (morph_sink_wants_jacobian(sink)) put_gradient(sink, 0, &d, uj, vj, 2.0 * term->scale * d.c);
+        if (morph_sink_wants_hessian(sink)) put_square_hessian(sink, &d, uj, vj, weight[0] * term->scale);
+    }
+    return MORPH_OK;
+}
+
+morph_block morph_block_upright(morph_upright_term *data, const int *unknown) {
+    return (morph_block){.name = "upright posts",
+                         .unknowns = 3 * data->structure->joints,
+                         .unknown = unknown,
+                         .data = data,
+                         .value = upright_value,
+                         .walk = upright_walk};
 }

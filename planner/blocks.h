@@ -45,6 +45,13 @@ const double *morph_angle_limit(const morph_structure *s, int tuple);
 double morph_angle_at(const morph_structure *s, int tuple, const double *x);
 void morph_angle_name(const morph_structure *s, int tuple, char *text, size_t size);
 
+/* Objective: scale * sum over link to post tuples of cos(angle)^2: posts upright on the links. */
+typedef struct morph_upright_term {
+    const morph_structure *structure;
+    double scale;
+} morph_upright_term;
+morph_block morph_block_upright(morph_upright_term *data, const int *unknown);
+
 /* A point of the structure: up to three joints with weights that sum to 1. */
 typedef struct morph_point {
     int joint[3];

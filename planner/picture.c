@@ -165,13 +165,25 @@ static void draw_title(cairo_t *c, const char *title, double x, double y, double
     morph_put_text(c, text, x, y, 24, 0, true, morph_colour_text);
 }
 
+/* What a record says of itself: it holds no title. */
+static void own_title(const morph_record *r, const morph_motion *m, char *text, size_t size) {
+    int nodes[2] = {0, 0};
+    for (int i = 0; i < r->joints; i++)
+        for (int k = 0; k < 2; k++)
+            if (r->joint_node[i][k] >= nodes[k]) nodes[k] = r->joint_node[i][k] + 1;
+    snprintf(text, size, "%d x %d nodes, %d links, %.2f s", nodes[0], nodes[1], r->links,
+             m->frames > 0 ? m->time[m->frames - 1] : 0.0);
+}
+
 static morph_status draw_page(cairo_t *c, const morph_record *r, const char *title) {
     morph_motion m = morph_motion_schedule(r);
     if (m.frames == 0) m = morph_motion_nominal(r); /* the best of a run that never got to a schedule */
     cairo_set_source_rgb(c, 1, 1, 1);
     cairo_paint(c);
     draw_key(c, PAGE_WIDTH - 36, 46);
-    draw_title(c, title ? title : "", 36, 48, PAGE_WIDTH - 580);
+    char own[96];
+    own_title(r, &m, own, sizeof own);
+    draw_title(c, title ? title : own, 36, 48, PAGE_WIDTH - 580);
     const morph_box first = {36, 70, 656, 452};
     morph_box room = inside(&first);
     morph_view base = oblique();

@@ -88,7 +88,7 @@ static morph_status stage_refine(planner *p) {
     s->rows_refine_possible = r.rows_possible;
     s->linear_seconds += r.effort.linear_seconds;
     s->callback_seconds += r.effort.callback_seconds;
-    p->optimal = p->optimal && r.last == MORPH_OPTIMAL;
+    p->optimal = r.last == MORPH_OPTIMAL;
     note_time(p, MORPH_STAGE_REFINE, since);
     return status;
 }
@@ -218,7 +218,7 @@ morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *
     const double since = morph_seconds();
     /* One BLAS thread: sums then repeat bit for bit. */
     morph_blas_threads(1);
-    planner p = {.scene = scene, .options = options, .optimal = true};
+    planner p = {.scene = scene, .options = options};
     if (options->control) p.quiet = *options->control;
     p.quiet.stop = NULL;
     p.plan = calloc(1, sizeof *p.plan);

@@ -68,6 +68,7 @@ morph_status morph_project(const morph_world *world, const morph_inset *inset, i
     const morph_nearness near = {.length = 0.1, .angle = 0.15, .clearance = 0.15, .self = 0.1};
     if (control) p.quiet = *control;
     p.quiet.log = NULL;
+    p.quiet.progress = NULL;
     p.reference = morph_alloc((size_t)p.n, sizeof(double));
     p.lower = morph_alloc((size_t)p.n, sizeof(double));
     morph_status status = p.reference && p.lower ? MORPH_OK : MORPH_ERR_NOMEM;
@@ -80,12 +81,6 @@ morph_status morph_project(const morph_world *world, const morph_inset *inset, i
     for (int round = 0; round < rounds && status == MORPH_OK; round++) {
         status = solve(&p, x);
         if (status == MORPH_OK) status = morph_pose_examine(world, x, inset, &near, active, NULL, violation);
-        morph_limit which = MORPH_LIMIT_POST;
-        morph_violation_worst(violation, morph_pose_tolerance, &which);
-        morph_log(control, "project %d: solved %d its %d worst %s %.3g %s rows %d (points %d pairs %d)",
-                  round, p.solved, effort->iterations, morph_limit_name(which), violation->amount[which],
-                  violation->element[which], morph_active_rows(active, world->structure), active->points,
-                  active->pairs);
         if (morph_violation_worst(violation, morph_pose_tolerance, NULL) <= 1.0 && (p.solved || round > 0))
             break;
         if (morph_stopped(control)) break;

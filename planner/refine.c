@@ -10,12 +10,13 @@ morph_refine_options morph_refine_defaults(void) {
     /* The insets leave room for the path's spline to approach the end from inside: a thousandth of a spacing,
      * and of a radian, changes the reachable shape by less than the links' radius. */
     return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
-                                  .cover_weight = 5.0,
+                                  .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.01,
                                   .press = 0.3,
                                   .reach = 0.3,
                                   .least_reach = 0.03,
                                   .hold = 1e-3,
+                                  .upright = 2e-4,
                                   .rounds = 12};
 }
 
@@ -102,7 +103,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     morph_status status =
         morph_cavity_closest(r->world->cavity, r->metres, r->cover_joint, r->cover_weight, NULL);
     if (status != MORPH_OK) return status;
-    morph_block blocks[MORPH_POSE_BLOCKS + 3];
+    morph_block blocks[MORPH_POSE_BLOCKS + 4];
     int count = morph_active_blocks(r->active, r->world, NULL, &r->options->inset, blocks);
     if (count < 0) return MORPH_ERR_NOMEM;
     /* The kink between target and base plane is rounded over a tenth of a spacing: the width of a link and
@@ -120,6 +121,10 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     memcpy(r->anchor, r->x, (size_t)n * sizeof *r->x);
     morph_near_term near = {n, r->anchor, r->options->hold};
     blocks[count++] = morph_block_near(&near, NULL);
+    /* Of the many shapes with the same cavity (lengths leave motions free) the one with upright posts is
+     * wanted: the other layer then follows the skin and does not crumple. */
+    morph_upright_term upright = {s, r->options->upright};
+    blocks[count++] = morph_block_upright(&upright, NULL);
     blocks[count++] = morph_block_gap(&gap, NULL);
     blocks[count++] = morph_block_cover(&cover, NULL);
     char message[256] = "";
@@ -145,6 +150,9 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     /* The start is feasible and near: a large barrier would first drive it away from every limit. */
     o.adaptive_mu = false;
     o.mu_init = 1e-3;
+    /* The result is moved inside its limits afterwards: of the points seen, one that gains much and breaks a
+     * row by a hundredth is wanted rather than the start. */
+    o.violation_tolerance = 1e-2;
 
     o.control = &r->quiet;
     if (r->options->seconds > 0.0)
@@ -210,7 +218,9 @@ static morph_status rounds(refiner *r) {
         /* Trust region: a round that did not help was too bold. */
         r->reach *= gain > 0.0 ? 1.25 : 0.5;
         r->reach = fmin(r->reach, o->reach);
-        small_gains = gain > 0.01 * before ? 0 : small_gains + (gain > 0.0);
+        /* A round cut short by its iterations says nothing of how near the best is. */
+        small_gains =
+            gain > 0.01 * before || r->report->last == MORPH_STOPPED ? 0 : small_gains + (gain > 0.0);
         memcpy(r->x, r->best, bytes);
         morph_progress(o->control, "refine", (round + 1.0) / o->rounds);
         if (morph_stopped(o->control)) status = MORPH_ERR_STOPPED;
@@ -232,6 +242,7 @@ morph_status morph_refine(const morph_world *world, const morph_refine_options *
         morph_pose_bounds(world, options->inset.clearance, r.base);
         if (options->control) r.quiet = *options->control;
         r.quiet.log = NULL;
+        r.quiet.progress = NULL;
         status = rounds(&r);
     }
     if (r.have_best) {

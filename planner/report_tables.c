@@ -31,10 +31,18 @@ static void sentence(morph_text *page, const char *tag, const char *plain) {
 
 void morph_report_outcome(morph_text *page, const morph_summary *s) {
     const char *what = "The run was stopped before a plan was found that holds every limit.";
-    if (s->feasible && strcmp(s->outcome, "optimal") == 0)
-        what = "The plan holds every limit, and the optimiser could not improve it further.";
+    const bool refined = strcmp(s->method, "blanket") != 0;
+    if (s->feasible && !refined)
+        what = "The blanket's own motion holds every limit. Nothing was refined.";
+    else if (s->feasible && strcmp(s->outcome, "optimal") == 0)
+        what =
+            "The plan holds every limit, and the last solve for its final shape converged: a local optimum.";
     else if (s->feasible)
-        what = "The plan holds every limit. The optimiser ended before it could call it the best nearby.";
+        what = "The plan holds every limit. The last solve for its final shape ended before it converged.";
+    else if (s->check.feasible && strcmp(s->outcome, "stopped") != 0)
+        what = "The schedule holds every limit of the structure, but not all that the scene asks for.";
+    else if (strcmp(s->outcome, "stopped") != 0 && !refined)
+        what = "The blanket's own motion breaks a limit and must not be driven. Nothing was refined.";
     else if (strcmp(s->outcome, "stopped") != 0)
         what = "This plan breaks a limit and must not be driven. It is the best that was found.";
     morph_text_add(page, "<div class=\"outcome %s\">\n", s->feasible ? "good" : "bad");
@@ -90,7 +98,7 @@ void morph_report_measures(morph_text *page, const morph_summary *s) {
         {"Cavity volume", "space between sheet, target and base", b->volume, p->volume, "m3"},
         {"Mean gap", "sheet to target or base, over the sheet's area", b->gap_mean, p->gap_mean, "m"},
         {"95&nbsp;% gap", "what 95&nbsp;% of the sheet stays below", b->gap_p95, p->gap_p95, "m"},
-        {"Largest gap", "", b->gap_max, p->gap_max, "m"},
+        {"Largest gap", "of all points of the sheet that are measured", b->gap_max, p->gap_max, "m"},
         {"Target gap", "target's exposed points to the sheet, mean", b->gap_target, p->gap_target, "m"},
         {"Coverage", "exposed points within a quarter spacing of the sheet", b->coverage, p->coverage, "%"},
     };
@@ -128,7 +136,7 @@ static const char *margin_words(morph_margin_kind kind) {
     case MORPH_MARGIN_JERK:
         return "Jerk of length";
     case MORPH_MARGIN_POST_LENGTH:
-        return "Post length (relative)";
+        return "Post length";
     case MORPH_MARGIN_PANEL:
         return "Panel planeness";
     case MORPH_MARGIN_LINK_POST:
@@ -235,11 +243,17 @@ void morph_report_solver(morph_text *page, const morph_summary *s) {
               s->rows_refine_possible);
     solve_row(page, "Path", s->iterations_path, s->unknowns_path, s->rows_path_used, s->rows_path_possible);
     solve_row(page, "Timing", s->iterations_timing, 0, 0, 0);
-    morph_text_add(page, "</table>\n<h2>Where the time went</h2>\n<table>\n<tr>");
-    for (int k = 0; k < MORPH_STAGES; k++)
+    morph_text_add(
+        page,
+        "</table>\n<p class=\"soft\">Iterations are those of all solves together, unknowns and rows "
+        "those of the largest. Possible are all rows of a pose: every link, angle and skin "
+        "triangle, and every pair of links and posts.</p>\n<h2>Where the time went</h2>\n<table>\n"
+        "<tr>");
+    /* Writing is not over when this is written. */
+    for (int k = 0; k < MORPH_STAGE_WRITE; k++)
         morph_text_add(page, "<th class=\"n\">%s</th>", morph_stage_name((morph_stage)k));
     morph_text_add(page, "<th class=\"n\">total</th></tr>\n<tr>");
-    for (int k = 0; k < MORPH_STAGES; k++)
+    for (int k = 0; k < MORPH_STAGE_WRITE; k++)
         morph_text_add(page, "<td class=\"n\">%.2f&nbsp;s</td>", s->seconds[k]);
     morph_text_add(page, "<td class=\"n\">%.2f&nbsp;s</td></tr>\n</table>\n", s->total_seconds);
     morph_text_add(page, "<p class=\"soft\">Linear solver %.2f s, derivatives %.2f s; peak memory %.0f MiB.",

@@ -3,6 +3,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+/* -0 is printed as 0. */
+static double without_sign_of_zero(double x) {
+    return x + 0.0;
+}
+
 static void outcome_line(FILE *out, const morph_summary *s) {
     if (s->feasible)
         fprintf(out, "outcome    %s: every limit holds\n", s->outcome);
@@ -13,9 +18,8 @@ static void outcome_line(FILE *out, const morph_summary *s) {
 static void cavity_line(FILE *out, const morph_summary *s) {
     const morph_measure *b = &s->blanket, *p = &s->plan;
     fprintf(out,
-            "cavity     %.4g -> %.4g m3, mean gap %.4g -> %.4g m, target gap %.4g -> %.4g m, coverage %.0f "
-            "-> %.0f %% "
-            "(blanket -> plan)\n",
+            "cavity     blanket -> plan: volume %.4g -> %.4g m3, mean gap %.4g -> %.4g m, target gap %.4g -> "
+            "%.4g m, coverage %.0f -> %.0f %%\n",
             b->volume, p->volume, b->gap_mean, p->gap_mean, b->gap_target, p->gap_target, 100.0 * b->coverage,
             100.0 * p->coverage);
 }
@@ -31,7 +35,8 @@ char *morph_plan_text(const morph_summary *s, const char *folder) {
     if (s->check.defect[0])
         fprintf(out, "margin     none: %s\n", s->check.defect);
     else
-        fprintf(out, "margin     %s %.3g %s: %s at %.3f s\n", morph_margin_name(s->check.worst), m->worst,
+        fprintf(out, "margin     %s %.3g %s: %s at %.3f s (the tightest; positive is inside)\n",
+                morph_margin_name(s->check.worst), without_sign_of_zero(m->worst),
                 morph_margin_unit(s->check.worst), m->element, m->time);
     fprintf(out, "duration   %.3f s\n", s->duration);
     if (s->free_motions > 0)
@@ -47,28 +52,55 @@ char *morph_plan_text(const morph_summary *s, const char *folder) {
     return text;
 }
 
+static void margin_line(FILE *out, morph_margin_kind kind, const morph_margin *m, const char *untested) {
+    if (!m->tested) {
+        fprintf(out, "%-15s %s\n", morph_margin_name(kind), untested);
+        return;
+    }
+    fprintf(out, "%-15s %-5s worst %12.5g %-8s (allowed from %6.0e) at %8.4f s  %s\n",
+            morph_margin_name(kind), m->worst >= -m->tolerance ? "holds" : "FAILS",
+            without_sign_of_zero(m->worst), morph_margin_unit(kind), -m->tolerance, m->time, m->element);
+}
+
 char *morph_check_text(const morph_check_report *r) {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out) return NULL;
     if (r->defect[0]) fprintf(out, "unusable: %s\n", r->defect);
-    for (int k = 0; k < MORPH_MARGIN_KINDS && !r->defect[0]; k++) {
-        const morph_margin *m = &r->margin[k];
-        if (!m->tested) {
-            fprintf(out, "%-15s not in this plan\n", morph_margin_name((morph_margin_kind)k));
-            continue;
-        }
-        fprintf(out, "%-15s %-5s worst %12.5g %-8s at %8.4f s  %s\n", morph_margin_name((morph_margin_kind)k),
-                m->worst >= -m->tolerance ? "holds" : "FAILS", m->worst,
-                morph_margin_unit((morph_margin_kind)k), m->time, m->element);
-    }
-    fprintf(out, "%s\n", r->feasible ? "every limit holds" : "not every limit holds");
+    /* Every plan has a target: a check without clearance was one of lengths alone. */
+    const bool lengths_only = !r->margin[MORPH_MARGIN_CLEARANCE].tested;
+    for (int k = 0; k < MORPH_MARGIN_KINDS && !r->defect[0]; k++)
+        margin_line(out, (morph_margin_kind)k, &r->margin[k],
+                    lengths_only ? "not tested: a schedule file holds lengths only" : "not in this plan");
+    if (!r->feasible)
+        fprintf(out, "not every limit holds\n");
+    else
+        fprintf(out, "every limit%s holds (margins: positive is inside)\n",
+                lengths_only ? " on lengths" : "");
     if (fclose(out) != 0) {
         free(text);
         return NULL;
     }
     return text;
+}
+
+static double in_degrees(double radians) {
+    return radians * 180.0 / M_PI;
+}
+
+static void limit_lines(FILE *out, const morph_structure *s) {
+    const morph_structure_def *d = &s->def;
+    fprintf(out, "limits     %d lengths from %.4g to %.4g m (bottom), %.4g to %.4g m (top)\n", s->links,
+            d->length[MORPH_LINK_BOTTOM][0], d->length[MORPH_LINK_BOTTOM][1], d->length[MORPH_LINK_TOP][0],
+            d->length[MORPH_LINK_TOP][1]);
+    fprintf(out, "           rate %.4g m/s, acceleration %.4g m/s2, jerk %.4g m/s3 of every length\n",
+            d->rate, d->acceleration, d->jerk);
+    fprintf(out,
+            "           %d angles of link and post from %.4g to %.4g degrees, %d of neighbouring links from "
+            "%.4g to %.4g\n",
+            s->link_posts, in_degrees(d->link_post[0]), in_degrees(d->link_post[1]), s->link_links,
+            in_degrees(d->link_link[0]), in_degrees(d->link_link[1]));
 }
 
 static void target_lines(FILE *out, const morph_mesh_report *t) {
@@ -90,13 +122,15 @@ char *morph_info_text(const morph_scene *scene, const morph_structure *s, const 
     fprintf(out, "scene      %s\n", scene->title && scene->title[0] ? scene->title : scene->file);
     fprintf(out, "structure  %d x %d nodes, spacing %.4g m: %d joints, %d links, %d posts\n", s->nx, s->ny,
             s->spacing, s->joints, s->links, s->posts);
-    fprintf(out, "limits     %d lengths, %d link-post angles, %d link-link angles\n", s->links, s->link_posts,
-            s->link_links);
-    fprintf(out,
-            "mobility   flat: rank %d of %d rows, %d free motions, %d redundant, least singular value %.4g\n",
-            m->rank, m->rows, m->free, m->redundant, m->sigma_min);
+    limit_lines(out, s);
+    fprintf(
+        out,
+        "mobility   flat: %d free motions, %d redundant lengths (rank %d of %d rows: links and posts), least "
+        "singular value %.4g\n",
+        m->free, m->redundant, m->rank, m->rows, m->sigma_min);
     target_lines(out, &scene->target_report);
-    fprintf(out, "size       %d unknowns for a pose\n", 3 * s->joints);
+    fprintf(out, "size       %d unknowns for a pose\nlinks      number, nodes (i,j) at both ends, layer\n",
+            3 * s->joints);
     for (int l = 0; l < s->links; l++) {
         char name[64];
         morph_link_name(s, l, name, sizeof name);

@@ -98,11 +98,12 @@ static void members(void **state) {
         morph_length_rows lengths = {f->structure, f->structure->links, link, 0.01};
         morph_stretch_term stretch = {f->structure, target, 0.7};
         morph_near_term near = {f->n, f->structure->start, 0.3};
-        const morph_block blocks[4] = {
-            morph_block_posts(&posts, NULL, lower, upper),
+        morph_upright_term upright = {f->structure, 0.6};
+        const morph_block blocks[5] = {
+            morph_block_upright(&upright, NULL), morph_block_posts(&posts, NULL, lower, upper),
             morph_block_lengths(&lengths, NULL, lower + f->structure->posts, upper + f->structure->posts),
             morph_block_stretch(&stretch, NULL), morph_block_near(&near, NULL)};
-        for (int b = 0; b < 4; b++)
+        for (int b = 0; b < 5; b++)
             expect_right(f, &blocks[b]);
     }
 }
