@@ -21,7 +21,9 @@ install_missing() {
     if [ "$(id -u)" -ne 0 ]; then
         root="sudo"
     fi
+    # Without a terminal of its own for dpkg: a bare root may have none to give. The environment is set behind sudo, which
+    # would drop it.
     $root apt-get update -qq
     # shellcheck disable=SC2086 # a list of names, one word each
-    DEBIAN_FRONTEND=noninteractive $root apt-get install -y -qq --no-install-recommends $missing >/dev/null
+    $root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 $missing >/dev/null
 }

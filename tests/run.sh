@@ -8,10 +8,19 @@ cd "$(dirname "$0")/.."
 # clang-format is left out on purpose: another version formats otherwise; style is checked where version 14 is there.
 install_missing $morph_packages libcmocka-dev
 
-# Sanitizer reports end the test that made them. Libraries that keep memory until exit are listed in tests/lsan.supp.
-export ASAN_OPTIONS="detect_stack_use_after_return=1"
-export UBSAN_OPTIONS="print_stacktrace=1"
-export LSAN_OPTIONS="suppressions=$(pwd)/tests/lsan.supp:print_suppressions=0"
+# The sanitizers read their options and the threads to examine from /proc. A bare root that lacks it gets it for the time of
+# the tests.
+if [ ! -r /proc/self/environ ]; then
+    if mount -t proc proc /proc; then
+        trap 'umount /proc' EXIT
+        trap 'exit 1' INT TERM HUP
+        echo "Mounted /proc for the sanitizers, until the tests end"
+    else
+        echo "The sanitizers need /proc: mount it first (mount -t proc proc /proc)"
+        exit 1
+    fi
+fi
+
 # One thread each: two tests run side by side.
 export OPENBLAS_NUM_THREADS=1
 
@@ -25,7 +34,7 @@ build_and_test() {
     cmake -S . -B "$1" -G Ninja -DCMAKE_BUILD_TYPE="$2" -DMORPH_WERROR=ON >"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
     cmake --build "$1" >>"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
     echo "Built $1 ($2)"
-    ctest --test-dir "$1" --output-on-failure -j 2
+    ctest --test-dir "$1" --output-on-failure --no-tests=error -j 2
 }
 
 build_and_test build-sanitize Sanitize
