@@ -206,8 +206,13 @@ static int on_stop(void *user) {
 static void test_stopped(void **state) {
     (void)state;
     char scene[128], out[128], message[512];
-    write_text("stop.yaml", small, scene);
+    write_text("stop.yaml",
+               "morphplan: 1\nstructure: {nodes: [2, 2], spacing: 0.1, link: {stiffness: 20}}\n"
+               "target: {shape: box, size: [0.05, 0.05, 0.04]}\n"
+               "motion: {friction: 0.4, time: 0.5}\nschedule: {sample: 0.01}\n",
+               scene);
     in_folder("stop.plan", out);
+    const morph_job plain = morph_job_defaults();
     const char *const stages[5] = {NULL, "nominal", "refine", "path", "timing"};
     for (int k = 0; k < 5; k++) {
         listener l = {.until = stages[k]};
@@ -233,7 +238,7 @@ static void test_stopped(void **state) {
         assert_string_equal(r.outcome, "stopped");
         assert_lengths_fit(&r);
         morph_record_free(&r);
-        const int checked = morph_check_folder(out, NULL, &job, NULL);
+        const int checked = morph_check_folder(out, NULL, &plain, NULL);
         assert_true(checked == MORPH_EXIT_DONE || checked == MORPH_EXIT_INFEASIBLE);
         assert_true(l.progress > 0 && l.reached);
     }
