@@ -18,8 +18,15 @@
 static const char small[] =
     "morphplan: 1\n"
     "title: small\n"
-    "structure: {nodes: [3, 3], spacing: 0.1, link: {stiffness: 20}}\n"
-    "target: {shape: box, size: [0.1, 0.1, 0.06]}\n"
+    "structure: {nodes: [3, 2], spacing: 0.1, link: {stiffness: 20}}\n"
+    "target: {shape: box, size: [0.1, 0.05, 0.06]}\n"
+    "motion: {friction: 0.4, time: 0.5}\n"
+    "schedule: {sample: 0.01}\n";
+
+static const char smaller[] =
+    "morphplan: 1\n"
+    "structure: {nodes: [2, 2], spacing: 0.1, link: {stiffness: 20}}\n"
+    "target: {shape: box, size: [0.05, 0.05, 0.04]}\n"
     "motion: {friction: 0.4, time: 0.5}\n"
     "schedule: {sample: 0.01}\n";
 
@@ -50,9 +57,9 @@ static int tear_down(void **state) {
     return system(command);
 }
 
-static morph_plan *plan_small(morph_method method) {
+static morph_plan *plan_text(const char *text, morph_method method) {
     char path[128];
-    write_text("small.yaml", small, path);
+    write_text("small.yaml", text, path);
     morph_scene *scene = NULL;
     assert_int_equal(morph_scene_read(path, NULL, NULL, NULL, &scene), MORPH_OK);
     const morph_plan_options o = {.method = method};
@@ -110,7 +117,7 @@ static void assert_tampering_shows(morph_record *r) {
 
 static void test_record(void **state) {
     (void)state;
-    morph_plan *p = plan_small(MORPH_METHOD_IPOPT);
+    morph_plan *p = plan_text(small, MORPH_METHOD_IPOPT);
     morph_record *r = &p->record;
     const morph_summary *s = &p->summary;
     assert_true(s->feasible && s->has_plan && s->has_blanket && s->reason[0] == '\0');
@@ -119,8 +126,8 @@ static void test_record(void **state) {
     assert_true(s->iterations_refine > 0 && s->iterations_path > 0 && s->peak_memory_bytes > 0);
     assert_true(s->rows_refine_used > 0 && s->rows_refine_used < s->rows_refine_possible);
     assert_true(fabs(s->duration - r->time[r->samples - 1]) < 1e-9);
-    assert_int_equal(r->joints, 18);
-    assert_int_equal(r->posts, 9);
+    assert_int_equal(r->joints, 12);
+    assert_int_equal(r->posts, 6);
     assert_string_equal(r->outcome, s->outcome);
     assert_int_equal(strlen(r->scene_sha256), 64);
     assert_true(r->path_s[0] == 0.0 && r->path_s[r->poses - 1] == 1.0);
@@ -206,15 +213,11 @@ static int on_stop(void *user) {
 static void test_stopped(void **state) {
     (void)state;
     char scene[128], out[128], message[512];
-    write_text("stop.yaml",
-               "morphplan: 1\nstructure: {nodes: [2, 2], spacing: 0.1, link: {stiffness: 20}}\n"
-               "target: {shape: box, size: [0.05, 0.05, 0.04]}\n"
-               "motion: {friction: 0.4, time: 0.5}\nschedule: {sample: 0.01}\n",
-               scene);
+    write_text("stop.yaml", smaller, scene);
     in_folder("stop.plan", out);
     const morph_job plain = morph_job_defaults();
-    const char *const stages[5] = {NULL, "nominal", "refine", "path", "timing"};
-    for (int k = 0; k < 5; k++) {
+    const char *const stages[4] = {NULL, "nominal", "path", "timing"};
+    for (int k = 0; k < 4; k++) {
         listener l = {.until = stages[k]};
         morph_job job = morph_job_defaults();
         job.folder = out;
@@ -247,7 +250,7 @@ static void test_stopped(void **state) {
 /* The pure blanket: a record, judged by the check like any other. */
 static void test_blanket(void **state) {
     (void)state;
-    morph_plan *p = plan_small(MORPH_METHOD_BLANKET);
+    morph_plan *p = plan_text(smaller, MORPH_METHOD_BLANKET);
     assert_int_equal(p->summary.iterations_refine, 0);
     assert_string_equal(p->summary.method, "blanket");
     assert_int_equal(holds(&p->record), p->summary.feasible);
