@@ -77,6 +77,20 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
     }
 }
 
+/* The guide's poses bent to the first station, then the stations themselves: each within reach of the one
+ * before and inside its limits. */
+static void set_stations(pather *p, const morph_trajectory *guide, const double *start) {
+    const double a = p->world->structure->spacing;
+    const size_t width = (size_t)p->coordinates;
+    const int stations = p->options->stations;
+    set_guided_poses(p, guide, start, p->options->station);
+    for (int m = 1; m < stations; m++) {
+        for (size_t i = 0; i < width; i++)
+            pose(p, p->count)[i] = p->options->station[(size_t)m * width + i] / a;
+        p->inset[p->count++] = 1.0;
+    }
+}
+
 /* Full inset away from the end, down to the end's own over the last quarter of the way. */
 static morph_inset inset_at(const pather *p, double s, double factor) {
     const double f = factor * fmin(1.0, (1.0 - s) / 0.25);
@@ -284,6 +298,7 @@ static morph_status run(pather *p, morph_curve **curve) {
     set_parameters(p);
     if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
     if (status == MORPH_OK) set_parameters(p);
+    double before = INFINITY;
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {
         breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
         if (!breaches) return MORPH_ERR_NOMEM;
@@ -294,9 +309,12 @@ static morph_status run(pather *p, morph_curve **curve) {
         morph_log(p->options->control, "path: %d poses: worst %s %.3g at %.3f (%s)", p->count,
                   morph_limit_name(which), p->report->violation.amount[which], p->report->where[which],
                   p->report->violation.element[which]);
+        /* More poses that do not bring it closer are no use. */
+        const bool hopeless = round > 1 && worst > 0.7 * before;
+        before = worst;
         bool changed = false;
         p->report->feasible = status == MORPH_OK && worst <= 1.0;
-        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !out_of_time(p))
+        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !out_of_time(p))
             status = mend(p, *curve, breaches, &changed);
         free(breaches);
         if (!changed) break;
@@ -313,7 +331,7 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
                 .options = options,
                 .report = report,
                 .coordinates = 3 * world->structure->joints,
-                .capacity = options->intervals + 8,
+                .capacity = options->intervals + options->stations + 8,
                 .started = morph_seconds()};
     const size_t rows = (size_t)p.capacity, width = (size_t)p.coordinates;
     p.s = morph_alloc(rows, sizeof(double));
@@ -323,7 +341,10 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     morph_status status = p.s && p.x && p.inset && p.metres ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) status = morph_active_create(world->structure, &p.active);
     if (status == MORPH_OK) {
-        set_guided_poses(&p, guide, start, end);
+        if (options->stations > 0)
+            set_stations(&p, guide, start);
+        else
+            set_guided_poses(&p, guide, start, end);
         status = run(&p, out);
     }
     report->poses = p.count;

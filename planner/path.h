@@ -12,11 +12,14 @@ typedef struct morph_path_options {
     morph_inset interior; /* the inset of poses far from the end: room for the spline between them */
     int intervals;        /* to begin with, at least 8 */
     int poses;            /* at most, after all insertions */
-    bool unfold;          /* poses stepped back from the end instead of taken from the guide */
-    int sweeps;           /* of smoothing and moving inside the limits */
-    double smoothness;    /* weight of second differences of poses beside the distance to the guide */
-    double seconds;       /* wall; <= 0: none */
-    bool refine;          /* false: the guide's poses as they are, nothing solved (the pure blanket) */
+    int stations; /* poses on the way from the guide's end to the end, the end among them as the last; 0: none
+                   */
+    const double *station; /* stations x 3*joints, metres */
+    bool unfold;           /* poses stepped back from the end instead of taken from the guide */
+    int sweeps;            /* of smoothing and moving inside the limits */
+    double smoothness;     /* weight of second differences of poses beside the distance to the guide */
+    double seconds;        /* wall; <= 0: none */
+    bool refine;           /* false: the guide's poses as they are, nothing solved (the pure blanket) */
     const morph_control *control;
 } morph_path_options;
 morph_path_options morph_path_defaults(void);

@@ -12,6 +12,7 @@ typedef struct planner {
     morph_workspace work;
     morph_trajectory nominal;
     double *end; /* 3*joints: the shape to reach */
+    morph_refine_report refined;
     morph_curve *curve;
     morph_timing timing;
     bool stopped;
@@ -75,8 +76,8 @@ static morph_status stage_refine(planner *p) {
     const double since = morph_seconds();
     morph_refine_options o = morph_refine_defaults();
     o.control = control_of(p);
-    morph_refine_report r;
-    morph_status status = morph_refine(&p->work.world, &o, p->end, &r);
+    morph_status status = morph_refine(&p->work.world, &o, p->end, &p->refined);
+    const morph_refine_report r = p->refined;
     if (status == MORPH_ERR_STOPPED) {
         p->stopped = true;
         status = MORPH_OK;
@@ -94,11 +95,16 @@ static morph_status stage_refine(planner *p) {
 }
 
 /* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
-static morph_status try_path(planner *p, bool unfold, int intervals, double *least) {
+static morph_status try_path(planner *p, bool unfold, bool stations, int intervals, double *least) {
     morph_path_options o = morph_path_defaults();
     o.control = control_of(p);
     o.refine = p->options->method != MORPH_METHOD_BLANKET && !p->stopped;
     o.unfold = unfold;
+    if (stations) {
+        o.stations = p->refined.stations;
+        o.station = p->refined.station;
+        o.smoothness = 1.0; /* the stations are small steps already: little smoothing keeps them inside */
+    }
     o.intervals = intervals;
     morph_curve *curve = NULL;
     morph_path_report r;
@@ -122,26 +128,27 @@ static morph_status try_path(planner *p, bool unfold, int intervals, double *lea
     return status;
 }
 
-/* First stepped back from the end in few poses, then in more, last along the blanket's own way: the first
- * that holds is taken. The pure blanket, and what is left after a stop, get their poses without a solve. */
+/* First stepped back from the end; then along the blanket's own way and the poses that the refinement went
+ * through; last stepped back in more poses: the first that holds is taken. The pure blanket, and what is left
+ * after a stop, get their poses without a solve. */
 static morph_status stage_path(planner *p) {
     static const struct {
-        bool unfold;
+        bool unfold, stations;
         int intervals;
-    } ways[] = {{true, 12}, {true, 24}, {false, 16}};
+    } ways[] = {{true, false, 12}, {false, true, 24}, {true, false, 24}};
     const double since = morph_seconds();
     double least = INFINITY;
     morph_status status = MORPH_OK;
     for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK; k++) {
         if (p->options->method == MORPH_METHOD_BLANKET || p->stopped) break;
-        status = try_path(p, ways[k].unfold, ways[k].intervals, &least);
+        status = try_path(p, ways[k].unfold, ways[k].stations, ways[k].intervals, &least);
         if (status == MORPH_ERR_STOPPED || morph_stopped(p->options->control)) {
             p->stopped = true;
             status = MORPH_OK;
         }
         if (p->curve && least <= 1.0) break;
     }
-    if (status == MORPH_OK && !p->curve) status = try_path(p, false, 24, &least);
+    if (status == MORPH_OK && !p->curve) status = try_path(p, false, false, 24, &least);
     note_time(p, MORPH_STAGE_PATH, since);
     return status;
 }
@@ -252,6 +259,7 @@ morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *
     const morph_status status = run_stages(&p);
     morph_timing_free(&p.timing);
     morph_curve_destroy(p.curve);
+    morph_refine_report_free(&p.refined);
     morph_trajectory_free(&p.nominal);
     morph_workspace_free(&p.work);
     free(p.end);

@@ -88,6 +88,11 @@ static morph_status consider(refiner *r, const double *x, const morph_violation 
     if (better) {
         memcpy(r->best, x, 3 * (size_t)r->world->structure->joints * sizeof *x);
         r->have_best = true;
+        if (feasible) {
+            const size_t n = 3 * (size_t)r->world->structure->joints;
+            memcpy(&r->report->station[(size_t)r->report->stations * n], r->metres, n * sizeof *x);
+            r->report->stations++;
+        }
         r->best_feasible = feasible;
         r->best_objective = m.objective;
         r->best_violation = worst;
@@ -229,6 +234,12 @@ static morph_status rounds(refiner *r) {
     return status;
 }
 
+void morph_refine_report_free(morph_refine_report *report) {
+    free(report->station);
+    report->station = NULL;
+    report->stations = 0;
+}
+
 morph_status morph_refine(const morph_world *world, const morph_refine_options *options, double *x,
                           morph_refine_report *report) {
     const morph_structure *s = world->structure;
@@ -236,6 +247,9 @@ morph_status morph_refine(const morph_world *world, const morph_refine_options *
     refiner r = {.world = world, .options = options, .report = report, .started = morph_seconds()};
     *report = (morph_refine_report){.rows_possible = morph_possible_rows(s)};
     morph_status status = allocate(&r);
+    /* The start and one pose a round. */
+    report->station = morph_alloc((size_t)options->rounds + 1, (size_t)n * sizeof(double));
+    if (!report->station) status = MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
         for (int i = 0; i < n; i++)
             r.x[i] = x[i] / s->spacing;

@@ -27,8 +27,12 @@ typedef struct morph_refine_report {
     double seconds;
     bool feasible;             /* by the exact examination of the returned pose, inset not counted */
     morph_violation violation; /* of the returned pose */
+    int stations;              /* poses that were kept on the way, the first inside its limits first */
+    double *station;           /* stations x 3*joints, metres; owned: morph_refine_report_free */
     morph_outcome last;        /* what the last solve concluded */
 } morph_refine_report;
+
+void morph_refine_report_free(morph_refine_report *report);
 
 /* x (3*joints, metres) is start and result: the feasible pose with the least cavity objective that was found,
  * the start included; where none is feasible, the least violating one. MORPH_ERR_STOPPED leaves the best so
