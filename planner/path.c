@@ -212,7 +212,8 @@ static morph_status mend(pather *p, const morph_curve *curve, const breach *brea
         /* Poses closer than this make the spline stiff rather than right. */
         const double gap = p->s[k + 1] - p->s[k];
         if (gap < 2e-3) continue;
-        const double s = fmin(p->s[k + 1] - 0.25 * gap, fmax(p->s[k] + 0.25 * gap, breaches[k].s));
+        /* Halves keep neighbouring intervals alike, without which a quintic swings. */
+        const double s = p->s[k] + 0.5 * gap;
         const morph_status status = insert_pose(p, curve, k, s);
         if (status != MORPH_OK) return status;
         *changed = true;
@@ -310,7 +311,7 @@ static morph_status run(pather *p, morph_curve **curve) {
                   morph_limit_name(which), p->report->violation.amount[which], p->report->where[which],
                   p->report->violation.element[which]);
         /* More poses that do not bring it closer are no use. */
-        const bool hopeless = round > 1 && worst > 0.7 * before;
+        const bool hopeless = round > 0 && worst > 0.9 * before && worst > 200.0;
         before = worst;
         bool changed = false;
         p->report->feasible = status == MORPH_OK && worst <= 1.0;

@@ -71,12 +71,42 @@ static morph_status stage_nominal(planner *p) {
     return status;
 }
 
+/* The blanket does not feel itself: where its axes pass through each other no path can follow. Its frames
+ * count up to the one before the first such; the refinement starts there and closes the rest itself. */
+static morph_status cut_tangle(planner *p) {
+    const morph_structure *st = p->work.structure;
+    const size_t width = 3 * (size_t)st->joints;
+    /* Axes nearer than three quarters of their radii's sum are about to pass: from frame to frame they move
+     * less than that. */
+    const double close = 0.5 * st->def.radius / st->spacing;
+    double *x = morph_alloc(width, sizeof(double));
+    morph_status status = x ? MORPH_OK : MORPH_ERR_NOMEM;
+    int clean = 0;
+    for (; clean < p->nominal.frames && status == MORPH_OK; clean++) {
+        morph_violation v;
+        for (size_t i = 0; i < width; i++)
+            x[i] = p->nominal.x[(size_t)clean * width + i] / st->spacing;
+        status = morph_pose_examine(&p->work.world, x, NULL, NULL, NULL, NULL, &v);
+        if (v.amount[MORPH_LIMIT_SELF] > close) break;
+    }
+    free(x);
+    if (status == MORPH_OK && clean > 1 && clean < p->nominal.frames) {
+        morph_log(control_of(p),
+                  "refine: the blanket passes through itself after %.2f s: going on from there",
+                  p->nominal.time[clean - 1]);
+        p->nominal.frames = clean;
+        memcpy(p->end, &p->nominal.x[(size_t)(clean - 1) * width], width * sizeof *p->end);
+    }
+    return status;
+}
+
 static morph_status stage_refine(planner *p) {
     if (p->options->method == MORPH_METHOD_BLANKET || p->stopped) return MORPH_OK;
     const double since = morph_seconds();
     morph_refine_options o = morph_refine_defaults();
     o.control = control_of(p);
-    morph_status status = morph_refine(&p->work.world, &o, p->end, &p->refined);
+    morph_status status = cut_tangle(p);
+    if (status == MORPH_OK) status = morph_refine(&p->work.world, &o, p->end, &p->refined);
     const morph_refine_report r = p->refined;
     if (status == MORPH_ERR_STOPPED) {
         p->stopped = true;

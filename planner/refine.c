@@ -176,6 +176,26 @@ static morph_status choose_rows(refiner *r, morph_violation *v) {
     return morph_pose_examine(r->world, r->x, &r->options->inset, &near, r->active, NULL, v);
 }
 
+/* Whether axes pass through each other on the straight way from the best pose to x: no path could follow.
+ * Seven poses between see it: within a round ends move apart by at most twice the reach, so from one to the
+ * next by less than two radii. */
+static morph_status passes_through(const refiner *r, const double *x, bool *through) {
+    const int n = 3 * r->world->structure->joints;
+    const double half = r->world->structure->def.radius / r->world->structure->spacing;
+    double *between = morph_alloc((size_t)n, sizeof(double));
+    morph_status status = between ? MORPH_OK : MORPH_ERR_NOMEM;
+    *through = false;
+    for (int step = 1; step < 8 && status == MORPH_OK && !*through; step++) {
+        morph_violation v;
+        for (int i = 0; i < n; i++)
+            between[i] = r->best[i] + step / 8.0 * (x[i] - r->best[i]);
+        status = morph_pose_examine(r->world, between, NULL, NULL, NULL, NULL, &v);
+        *through = v.amount[MORPH_LIMIT_SELF] > half;
+    }
+    free(between);
+    return status;
+}
+
 /* One round from the feasible r->x: a solve within reach, its result moved inside the limits, and kept if it
  * is better. */
 static morph_status improve(refiner *r, int round, double *objective) {
@@ -190,7 +210,10 @@ static morph_status improve(refiner *r, int round, double *objective) {
     memcpy(r->x, result.x, bytes);
     status = morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
                            &r->report->effort);
-    if (status == MORPH_OK) status = consider(r, r->x, &v, objective);
+    bool through = false;
+    *objective = INFINITY;
+    if (status == MORPH_OK && r->best_feasible) status = passes_through(r, r->x, &through);
+    if (status == MORPH_OK && !through) status = consider(r, r->x, &v, objective);
     morph_limit which = MORPH_LIMIT_POST;
     morph_violation_worst(&v, morph_pose_tolerance, &which);
     morph_log(

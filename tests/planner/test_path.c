@@ -34,6 +34,7 @@ static void prepare(journey *j, const solid *body, double height, int rounds) {
     o.rounds = rounds;
     morph_refine_report r;
     assert_int_equal(morph_refine(&j->f.world, &o, j->end, &r), MORPH_OK);
+    morph_refine_report_free(&r);
     assert_true(r.feasible);
 }
 

@@ -56,7 +56,8 @@ static void lowers(const solid *body, double top, double gain, double slack) {
     double *x = draped(&f, top + 0.05);
     const double before = objective(&f, x);
     const morph_refine_options o = brief(4);
-    morph_refine_report r;
+    morph_refine_report r = {0};
+    morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &o, x, &r), MORPH_OK);
     assert_true(r.feasible && r.rounds >= 1 && r.effort.solves >= r.rounds);
     assert_true(r.jacobian_nonzeros > 0 && r.hessian_nonzeros > 0 &&
@@ -67,12 +68,14 @@ static void lowers(const solid *body, double top, double gain, double slack) {
 
     /* Again from the result: feasible, so never worse, to the bit where nothing is gained. */
     const morph_refine_options again = brief(2);
+    morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &again, x, &r), MORPH_OK);
     assert_true(r.feasible);
     assert_metres_within(&f, x, slack);
     if (objective(&f, x) > after * (1.0 + 1e-3))
         fail_msg("objective %.8g from a feasible %.8g", objective(&f, x), after);
     free(x);
+    morph_refine_report_free(&r);
     fixture_free(&f);
 }
 
@@ -102,13 +105,15 @@ static void test_flat_start(void **state) {
         x[i] = f.s->start[i] + (i % 3 == 2 ? 0.1 : 0.0);
     const double before = objective(&f, x);
     const morph_refine_options o = brief(2);
-    morph_refine_report r;
+    morph_refine_report r = {0};
+    morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &o, x, &r), MORPH_OK);
     if (!r.feasible || r.rounds != 2 || objective(&f, x) > 0.7 * before)
         fail_msg("feasible %d after %d rounds, objective %.6g from %.6g", r.feasible, r.rounds,
                  objective(&f, x), before);
     assert_metres_within(&f, x, 1.3);
     free(x);
+    morph_refine_report_free(&r);
     fixture_free(&f);
 }
 
@@ -129,7 +134,7 @@ static void test_stop(void **state) {
     soft_grid(&f, &box);
     double *start = draped(&f, 0.14), *x = morph_alloc((size_t)f.n, sizeof *x);
     assert_non_null(x);
-    morph_refine_report r;
+    morph_refine_report r = {0};
     const morph_refine_options none = brief(0);
     assert_int_equal(morph_refine(&f.world, &none, start, &r), MORPH_OK);
     assert_true(r.feasible);
@@ -141,6 +146,7 @@ static void test_stop(void **state) {
         morph_refine_options o = brief(6);
         o.control = &control;
         memcpy(x, start, (size_t)f.n * sizeof *x);
+        morph_refine_report_free(&r);
         assert_int_equal(morph_refine(&f.world, &o, x, &r), MORPH_ERR_STOPPED);
         assert_true(c.asked > c.most);
         if (c.asked > c.most + 60) fail_msg("asked %d times more after the first yes", c.asked - c.most);
@@ -151,6 +157,7 @@ static void test_stop(void **state) {
     }
     free(start);
     free(x);
+    morph_refine_report_free(&r);
     fixture_free(&f);
 }
 
@@ -163,14 +170,17 @@ static void test_seconds_and_faults(void **state) {
     morph_refine_options o = brief(50);
     o.least_reach = 0.0;
     o.seconds = 0.2;
-    morph_refine_report r;
+    morph_refine_report r = {0};
     const double began = morph_seconds();
+    morph_refine_report_free(&r);
     const morph_status status = morph_refine(&f.world, &o, x, &r);
     assert_true(status == MORPH_OK);
     assert_true(r.rounds < 50 && morph_seconds() - began < 5.0);
     x[4] = NAN;
+    morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &o, x, &r), MORPH_ERR_NONFINITE);
     free(x);
+    morph_refine_report_free(&r);
     fixture_free(&f);
 }
 
@@ -184,12 +194,15 @@ static void test_repeats(void **state) {
     assert_non_null(y);
     memcpy(y, x, (size_t)f.n * sizeof *y);
     const morph_refine_options o = brief(2);
-    morph_refine_report r;
+    morph_refine_report r = {0};
+    morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &o, x, &r), MORPH_OK);
+    morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &o, y, &r), MORPH_OK);
     assert_memory_equal(x, y, (size_t)f.n * sizeof *y);
     free(x);
     free(y);
+    morph_refine_report_free(&r);
     fixture_free(&f);
 }
 
