@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 morph_job morph_job_defaults(void) {
     return (morph_job){.method = "ipopt"};
@@ -145,6 +146,11 @@ int morph_check_folder(const char *folder, const char *schedule, const morph_job
     morph_record record = {0};
     morph_check_report report = {0};
     morph_blas_threads(1);
+    if (access(folder, F_OK) != 0) {
+        snprintf(message, sizeof message, "%s: no such plan folder", folder);
+        say(job, message);
+        return MORPH_EXIT_INPUT;
+    }
     morph_status status = morph_folder_read(folder, &record, message, sizeof message);
     if (status == MORPH_OK && schedule)
         status = check_schedule_file(&record, schedule, message, sizeof message, &report);
@@ -165,6 +171,11 @@ int morph_check_folder(const char *folder, const char *schedule, const morph_job
 int morph_picture_folder(const char *folder, const char *file, const morph_job *job) {
     char message[512] = "";
     morph_record record = {0};
+    if (access(folder, F_OK) != 0) {
+        snprintf(message, sizeof message, "%s: no such plan folder", folder);
+        say(job, message);
+        return MORPH_EXIT_INPUT;
+    }
     morph_status status = morph_folder_read(folder, &record, message, sizeof message);
     if (status == MORPH_OK) status = morph_picture_write(&record, NULL, file, message, sizeof message);
     morph_record_free(&record);

@@ -29,9 +29,9 @@ warn(char *text, size_t size, const char *format, ...) {
 
 /* ---- shapes ---- */
 
-/* Chords within 5e-4 spacing of the true surface: half of the contact tolerance (1e-3 spacing), so that what
- * is planned on the facets also holds on the shape. Never finer than 1e-5 of the size, some 700 facets
- * around: beyond that only memory is filled. */
+/* Chords within 2e-3 spacing of the true surface, a twentieth of a link's usual radius: the facets are the
+ * target from here on, for the plan and for its check, and finer ones cost every distance. Never finer than
+ * 1e-5 of the size, some 700 facets around. */
 static double chord(const morph_target_def *def, double spacing, double scale) {
     double size = 0;
     switch (def->shape) {
@@ -44,7 +44,7 @@ static double chord(const morph_target_def *def, double spacing, double scale) {
     default:
         size = def->radius;
     }
-    return fmax(5e-4 * spacing / scale, 1e-5 * size);
+    return fmax(2e-3 * spacing / scale, 1e-5 * size);
 }
 
 static morph_status shape_mesh(const morph_target_def *def, double error, morph_mesh *mesh) {

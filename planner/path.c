@@ -64,9 +64,14 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
     const double a = p->world->structure->spacing;
     const double *last = &guide->x[(size_t)(guide->frames - 1) * (size_t)n];
     p->count = p->options->intervals + 1;
+    int at_frame = -1;
+
     for (int k = 0; k < p->count; k++) {
         const double progress = (double)k / (p->count - 1), bend = smooth_step(progress);
-        const double *frame = &guide->x[(size_t)frame_at(guide, n, progress) * (size_t)n];
+        /* Never the same frame twice: two poses alike would make the spline swing. */
+        const int first = frame_at(guide, n, progress);
+        at_frame = first > at_frame ? first : at_frame + 1 < guide->frames ? at_frame + 1 : at_frame;
+        const double *frame = &guide->x[(size_t)at_frame * (size_t)n];
         for (int i = 0; i < n; i++) {
             double at = frame[i] + bend * (end[i] - last[i]);
             if (k == 0) at = start[i];
@@ -311,7 +316,7 @@ static morph_status run(pather *p, morph_curve **curve) {
                   morph_limit_name(which), p->report->violation.amount[which], p->report->where[which],
                   p->report->violation.element[which]);
         /* More poses that do not bring it closer are no use. */
-        const bool hopeless = round > 0 && worst > 0.9 * before && worst > 200.0;
+        const bool hopeless = round > 0 && worst > 0.9 * before && p->report->violation.amount[which] > 0.05;
         before = worst;
         bool changed = false;
         p->report->feasible = status == MORPH_OK && worst <= 1.0;

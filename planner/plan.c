@@ -183,6 +183,20 @@ static morph_status stage_path(planner *p) {
     return status;
 }
 
+/* A path that breaks its limits can ask for hours: its record is sampled more coarsely rather than filling
+ * the memory, and is not feasible. */
+static double sample_step(planner *p) {
+    const double most = 200000.0, samples = p->timing.duration / p->scene->sample;
+    morph_summary *s = &p->plan->summary;
+    if (samples <= most) return p->scene->sample;
+    if (!s->reason[0])
+        snprintf(s->reason, sizeof s->reason,
+                 "schedule.sample: %.6g s would make %.0f samples of a schedule of %.6g s, at most %.0f are "
+                 "written",
+                 p->scene->sample, samples, p->timing.duration, most);
+    return p->timing.duration / most;
+}
+
 static morph_status stage_timing(planner *p) {
     const double since = morph_seconds();
     const morph_timing_options o = {p->scene->duration, p->scene->sample, control_of(p)};
@@ -198,7 +212,7 @@ static morph_status stage_timing(planner *p) {
                  "schedule.duration: %.6g s is too short: this path needs %.6g s", p->scene->duration,
                  r.needed);
     if (status == MORPH_OK)
-        status = morph_record_schedule(&p->plan->record, p->curve, &p->timing, p->scene->sample);
+        status = morph_record_schedule(&p->plan->record, p->curve, &p->timing, sample_step(p));
     note_time(p, MORPH_STAGE_TIMING, since);
     return status;
 }

@@ -230,7 +230,10 @@ static morph_status rounds(refiner *r) {
     const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
     morph_violation v;
     double objective;
-    /* The start: the blanket, moved inside the limits. */
+    /* The start as it is, where it holds; else moved inside the limits. */
+    morph_status first = morph_pose_examine(r->world, r->x, NULL, NULL, NULL, NULL, &v);
+    if (first == MORPH_OK) first = consider(r, r->x, &v, &objective);
+    if (first != MORPH_OK) return first;
     morph_status status =
         morph_project(r->world, &o->inset, 8, o->control, r->active, r->x, &v, &r->report->effort);
     if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
