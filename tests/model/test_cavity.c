@@ -295,7 +295,7 @@ static void test_closest_points(void **state) {
                                                    h->x + 3 * h->skin[t][1], h->x + 3 * h->skin[t][2], w));
         assert_near(distance[i], best, 1e-14);
         sum += c->expose[i].area * (best - 0.004);
-        squares += c->expose[i].area * (best - 0.004) * (best - 0.004);
+        squares += MORPH_COVER_WEIGHT * c->expose[i].area * (best - 0.004) * (best - 0.004);
         area += c->expose[i].area;
     }
     assert_int_equal(morph_cavity_closest(c, h->x, NULL, NULL, NULL), MORPH_OK);
