@@ -193,8 +193,7 @@ static int take_option(int option, const char *value, arguments *a) {
         printf("morphplan %s\n", morph_version());
         exit(MORPH_EXIT_DONE);
     default:
-        fprintf(stderr, "try: morphplan --help\n");
-        return MORPH_EXIT_INPUT;
+        return MORPH_EXIT_INPUT; /* said where the option was read */
     }
 }
 
@@ -212,13 +211,21 @@ static int read_arguments(int argc, char **argv, arguments *a) {
                                             {"version", no_argument, NULL, O_VERSION},
                                             {NULL, 0, NULL, 0}};
     int option;
+    opterr = 0; /* getopt's own lines would make two of one fault */
     while ((option = getopt_long(argc, argv, "o:", options, NULL)) != -1) {
+        if (option == '?') {
+            fprintf(stderr,
+                    "morphplan: unknown option, or one without its value: %s; try: morphplan --help\n",
+                    argv[optind - 1]);
+            return MORPH_EXIT_INPUT;
+        }
         const int code = take_option(option, optarg, a);
         if (code != 0) return code;
     }
     if (argc - optind != 1)
         return usage_fault(argc - optind < 1 ? "nothing to work on" : "too many arguments",
-                           argc - optind < 1 ? "" : argv[optind + 1], "one scene or plan folder");
+                           argc - optind < 1 ? "" : argv[optind + 1],
+                           "one scene (plan, info) or one plan folder (check, picture)");
     a->subject = argv[optind];
     return 0;
 }
