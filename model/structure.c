@@ -172,11 +172,14 @@ static void place_skin(morph_structure *s) {
         for (int i = 0; i + 1 < s->nx; i++) {
             const int a = joint_at(s, 0, i, j), b = joint_at(s, 0, i + 1, j);
             const int c = joint_at(s, 0, i, j + 1), d = joint_at(s, 0, i + 1, j + 1);
-            /* Diagonals alternate, so that the skin has no preferred direction. */
+            /* Diagonals run around the middle of the grid. A sheet that drapes over a bump shears its cells
+             * so that they grow long towards the middle: the diagonal across that is the short one, and
+             * triangles on it lie closer to what is beneath. */
+            const bool falling = (2 * i + 2 - s->nx) * (2 * j + 2 - s->ny) > 0;
             const int even[2][3] = {{a, b, d}, {a, d, c}}, odd[2][3] = {{a, b, c}, {b, d, c}};
             for (int k = 0; k < 2; k++, t++)
                 for (int m = 0; m < 3; m++)
-                    s->skin[t][m] = (i + j) % 2 ? odd[k][m] : even[k][m];
+                    s->skin[t][m] = falling ? odd[k][m] : even[k][m];
         }
 }
 
