@@ -24,7 +24,7 @@ static void known_truth(void **state) {
     }
     assert_int_equal(n, SWEPT_QUERIES);
     /* Fewer than the 450 and 300 allowed: a change that loses precision is to be seen. */
-    static const int allowed[2] = {75, 75};
+    static const int allowed[2] = {75, 5};
     for (int mode = 0; mode < 2; mode++) {
         int colliding = 0, misses = 0, alarms = 0;
         for (int i = 0; i < n; i++) {
@@ -83,8 +83,8 @@ static void dense_sampling(void **state) {
             const bool hit = swept_run(&q, &o, &toi);
             assert_true(toi <= first);
             if (least > separation + band) assert_false(hit);
-            /* The time is not late; nor is it early by more than the sampling: there the pair is near. */
-            if (hit) assert_true(distance_at(&q, toi) <= separation + 1e-3);
+            /* Not late, and not early: the pair is near then. */
+            if (hit) assert_true(distance_at(&q, toi) <= separation + (mode ? 1e-8 : 1e-5));
             hits += hit;
             apart += !hit;
         }
