@@ -125,6 +125,19 @@ static void extend_turning(const morph_swept_polygon *p, const double w[3], doub
     }
 }
 
+/* Least step that counts as progress: `least` of the motion, or of the pair's own size where that is the
+ * smaller; but never below what time itself resolves. */
+static double least_step(const morph_swept_polygon *p, double least) {
+    double travel = 0, size = p->separation;
+    for (int j = 0; j < p->corners; j++) {
+        const int next = j + 1 < p->corners ? j + 1 : 0;
+        travel = fmax(travel, morph_dist(p->at[0][j], p->at[1][j]));
+        for (int e = 0; e < 2; e++)
+            size = fmax(size, morph_dist(p->at[e][j], p->at[e][next]));
+    }
+    return size < travel ? fmax(least * size / travel, 1e-15) : least;
+}
+
 bool morph_swept_advance(const morph_swept_polygon *p, double least, int steps, double *toi) {
     double t = *toi, reach = 0, last = 0;
     bool stuck = false;
@@ -139,7 +152,7 @@ bool morph_swept_advance(const morph_swept_polygon *p, double least, int steps, 
         last = step;
         if (until <= 1 && until - t < least) {
             extend_further(p, (const double(*)[3])x, normal, t, &until);
-            stuck = until - t < least;
+            stuck = until - t < least && until - t < least_step(p, least);
         }
         if (until > 1) return false;
         t = until;

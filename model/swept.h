@@ -2,9 +2,10 @@
  * chords over the time [0, 1]: can the two come within a separation of each other, and from when on?
  *
  * Conservative: a pair that truly meets is never missed, whatever the rounding, and the time given is never
- * later than the true one. The price is false alarms, pairs that only nearly touch: nearer
- * than about 1e-15 of what they move across, or alongside each other at 1e-7 of it while turning; in the
- * strict mode the first number is 1e-28.
+ * later than the true one. The price is false alarms: pairs that only nearly touch, for the fast mode nearer
+ * than about 1e-15 of their size or of the way they go relative to each other (whichever is more), for the
+ * strict mode about 1e-25; with a separation, 1e-15 of it for both; and pairs that slide or turn along each
+ * other so near that the steps run out.
  *
  * Method (directional conservative advancement). Relative to the vertex, the triangle is a moving triangle
  * and must not reach the origin; the differences of two edges' points likewise fill a moving parallelogram.

@@ -44,7 +44,8 @@ int morph_swept_candidates(int corners, const double x[4][3], const double norma
                            double w[MORPH_SWEPT_CANDIDATES][3]);
 
 /* Advances *t, before which all is proven free, in double: at most `steps` steps, until one is below `least`
- * (part of the motion). False: free up to and including 1. True: stuck at *t. */
+ * (part of the motion, or of the pair's size if that is smaller). False: free up to and including 1. True:
+ * stuck at *t. */
 bool morph_swept_advance(const morph_swept_polygon *p, double least, int steps, double *t);
 
 /* Continues at *t, before which all is proven free, with exact directions. True: hit, *t the time. */

@@ -178,7 +178,7 @@ static void degenerate_shapes(void **state) {
         {false, {{0, 0, 0}, {1, 1, 0}, {2, 2, 0}}, {{1.5, 1.25, 1}}, {{1.5, 1.25, -3}}, 0, INFINITY},
         /* Edges without length; parallel edges; edges on one line. */
         {true, {{0, 0, 0}, {0, 0, 0}}, {{0, 0, 1}, {0, 0, 1}}, {{0, 0, -1}, {0, 0, -1}}, 0, 0.5},
-        {true, {{0, 0, 0}, {1, 0, 0}}, {{2, 0, 1}, {2, 0, 1}}, {{0, 0, -1}, {0, 0, -1}}, 0, INFINITY},
+        {true, {{0, 0, 0}, {1, 0, 0}}, {{2.2, 0, 1}, {2.2, 0, 1}}, {{0, 0, -1}, {0, 0, -1}}, 0, INFINITY},
         {true, {{0, 0, 0}, {1, 0, 0}}, {{0.5, 0, 1}, {1.5, 0, 1}}, {{0.5, 0, -1}, {1.5, 0, -1}}, 0, 0.5},
         {true, {{0, 0, 0}, {1, 0, 0}}, {{0.5, 0, 1}, {1.5, 0, 1}}, {{1.5, 0, -1}, {2.5, 0, -1}}, 0, 0.5},
         {true, {{0, 0, 0}, {1, 0, 0}}, {{3, 0, 0}, {4, 0, 0}}, {{-1, 0, 0}, {0, 0, 0}}, 0, 0.5},
@@ -199,7 +199,12 @@ static void standing_still(void **state) {
         {false, FLOOR, {{0.25, 0.25, 0.5}}, {{0.25, 0.25, 0.5}}, 0.5, 0},
         {false, FLOOR, {{0.25, 0.25, 0.5}}, {{0.25, 0.25, 0.5}}, 0.4999999, INFINITY},
         {true, {{0, 0, 0}, {1, 0, 0}}, {{0.5, -1, 0}, {0.5, 1, 0}}, {{0.5, -1, 0}, {0.5, 1, 0}}, 0, 0},
-        {true, {{0, 0, 0}, {1, 0, 0}}, {{0.5, 1e-20, 0}, {0.5, 1, 0}}, {{0.5, 1e-20, 0}, {0.5, 1, 0}}, 0, 2},
+        {true,
+         {{0, 0, 0}, {1, 0, 0}},
+         {{0.5, 1e-20, 0}, {0.5, 1, 0}},
+         {{0.5, 1e-20, 0}, {0.5, 1, 0}},
+         0,
+         INFINITY},
     };
     check_pairs(p, sizeof p / sizeof *p);
 }
@@ -251,7 +256,8 @@ static void very_fast(void **state) {
             double toi;
             const bool hit = swept_run(&q, &modes[mode], &toi);
             assert_int_equal(hit, !miss);
-            if (hit) assert_true(fabs(toi - when) < 1e-6);
+            /* Late by the rounding of the coordinates only, a part in 1e16 of the motion. */
+            if (hit) assert_true(toi <= when + 1e-14 && toi >= when - 1e-12);
         }
     }
 }
