@@ -62,7 +62,8 @@ static void exact_corners(const morph_swept_polygon *p, twice d[2][4][3]) {
 }
 
 /* Proven free times of w (largest component about 1), as morph_swept_free. A dot product errs by less than
- * 20 2^-106 of its products: 2^-100 covers it. The bounds v are then rounded to double: 2u more at the root.
+ * 30 times 2^-106 of its products: 2^-100 covers it. The bounds v are then rounded to double: 2u more at the
+ * root.
  */
 static morph_swept_span exact_free(const morph_swept_polygon *p, twice d[2][4][3], const twice w[3]) {
     morph_swept_span free = {-1, 2};
