@@ -50,7 +50,8 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     b->contact = morph_alloc(most + (size_t)s->joints, sizeof *b->contact);
     b->hold = morph_alloc(most + (size_t)s->joints, sizeof *b->hold);
     b->spare_touch = morph_alloc(most, sizeof *b->spare_touch);
-    if (!b->touch || !b->contact || !b->hold || !b->spare_touch) return MORPH_ERR_NOMEM;
+    b->memo = morph_alloc((size_t)(s->links + s->skin_triangles), sizeof *b->memo);
+    if (!b->touch || !b->contact || !b->hold || !b->spare_touch || !b->memo) return MORPH_ERR_NOMEM;
     if (!b->sdf) return MORPH_OK;
     for (int j = 0; j < s->joints; j++)
         add_touch(b, &j, 1, &whole, s->def.radius);
@@ -212,19 +213,24 @@ void morph_blanket_forget(morph_blanket_state *b) {
     for (int t = 0; t < b->touches; t++)
         b->touch[t].wake = 0.0;
     for (int t = 0; t < b->angles; t++)
-        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+        b->angle[t].push[0] = b->angle[t].push[1] = b->angle[t].wake = 0.0;
+    memset(b->link_wake, 0, (size_t)b->links * sizeof *b->link_wake);
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
 }
 
-void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
+double morph_blanket_moved(const morph_blanket_state *b, const double *x) {
     double fastest = 0.0;
     for (int j = 0; j < b->joints; j++) {
         double move[3];
         morph_sub(&x[3 * j], &b->before[3 * j], move);
         fastest = fmax(fastest, morph_dot(move, move));
     }
-    const double move = sqrt(fastest) + fabs(b->lift_to - b->lift);
+    return sqrt(fastest);
+}
+
+void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
+    const double move = morph_blanket_moved(b, x) + fabs(b->lift_to - b->lift);
     b->contacts = 0;
     for (int t = 0; t < b->touches; t++)
         find_target(b, &b->touch[t], x, move);
@@ -319,54 +325,81 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
     return depth;
 }
 
-/* One contact at the deepest place of an element by exact distance; returns its violation. */
-static double find_deepest(morph_blanket_state *b, const double *x, const int *joint, int corners,
-                           double radius) {
-    const double near = NEAR * b->structure->spacing;
-    double weight[3] = {0.0};
-    morph_closest at;
-    double v[3][3];
+/* Corners of an element as the target sees them; its exact distance less the radius, where it is nearest. */
+static double exact_gap(const morph_blanket_state *b, const double v[3][3], int corners, double radius,
+                        double weight[3], morph_closest *at) {
+    if (corners == 2)
+        morph_distance_segment(b->exact, v[0], v[1], weight, at);
+    else
+        morph_distance_triangle(b->exact, v[0], v[1], v[2], weight, at);
+    return at->distance - radius;
+}
+
+static void place_element(const morph_blanket_state *b, const double *x, const int *joint, int corners,
+                          double v[3][3]) {
     for (int k = 0; k < corners; k++) {
         memcpy(v[k], &x[3 * joint[k]], sizeof v[k]);
         v[k][2] -= b->lift_to;
     }
-    if (corners == 2)
-        morph_distance_segment(b->exact, v[0], v[1], weight, &at);
-    else
-        morph_distance_triangle(b->exact, v[0], v[1], v[2], weight, &at);
-    if (at.distance - radius > near) return 0.0;
-    morph_contact *c = add_contact(b, joint, corners, weight, 0);
-    double q[3];
-    place_of(x, joint, corners, weight, q);
+}
+
+/* Elements that may touch: skin triangles and the links that are no edges of them. */
+typedef struct element {
+    const int *joint;
+    int corners;
+    double radius;
+    bool tested;
+} element;
+
+static element element_of(const morph_structure *s, int n) {
+    if (n >= s->links) return (element){s->skin[n - s->links], 3, s->def.radius, true};
+    return (element){s->link[n], 2, s->link_radius[n], s->link_kind[n] != MORPH_LINK_BOTTOM};
+}
+
+double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
+    const morph_structure *s = b->structure;
+    double depth = base_depth(b, x);
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        const element e = element_of(s, n);
+        if (!e.tested) continue;
+        morph_memo *memo = &b->memo[n];
+        double v[3][3], weight[3], moved = 0.0;
+        morph_closest at;
+        place_element(b, x, e.joint, e.corners, v);
+        for (int k = 0; k < e.corners && memo->known; k++)
+            moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
+        if (memo->known && memo->gap - moved >= 0.0) continue;
+        memo->gap = exact_gap(b, v, e.corners, e.radius, weight, &at);
+        memo->known = true;
+        memcpy(memo->corner, v, sizeof v);
+        depth = fmax(depth, -memo->gap);
+    }
+    return depth;
+}
+
+/* One contact at the deepest place of an element. */
+static void find_deepest(morph_blanket_state *b, const double *x, const element *e) {
+    double v[3][3], weight[3] = {0.0}, q[3];
+    morph_closest at;
+    place_element(b, x, e->joint, e->corners, v);
+    if (exact_gap(b, v, e->corners, e->radius, weight, &at) > NEAR * b->structure->spacing) return;
+    morph_contact *c = add_contact(b, e->joint, e->corners, weight, 0);
+    place_of(x, e->joint, e->corners, weight, q);
     memcpy(c->normal, at.normal, sizeof c->normal);
-    c->level = morph_dot(c->normal, q) - at.distance + radius + CONTACT_MARGIN * b->structure->spacing;
+    c->level = morph_dot(c->normal, q) - at.distance + e->radius + CONTACT_MARGIN * b->structure->spacing;
     c->radius = -1.0; /* the plane stays */
     b->contacts++;
-    return fmax(0.0, radius - at.distance);
 }
 
-/* Whether any of the touches [from, to) has been near lately. */
-static bool awake(const morph_blanket_state *b, int from, int to) {
-    for (int t = from; t < to; t++)
-        if (b->path >= b->touch[t].wake) return true;
-    return false;
-}
-
-double morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
+void morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
-    double depth = 0.0;
-    int t = s->joints;
     b->contacts = 0;
-    for (int l = 0; l < s->links; l++) {
-        /* Links of the skin's layer are edges of its triangles. */
-        const bool edge = s->link_kind[l] == MORPH_LINK_BOTTOM;
-        const int from = t;
-        t += edge ? 3 : 4;
-        if (!edge && awake(b, from, t))
-            depth = fmax(depth, find_deepest(b, x, s->link[l], 2, s->link_radius[l]));
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        const element e = element_of(s, n);
+        const morph_memo *memo = &b->memo[n];
+        /* What is far by its last distance is far still. */
+        if (e.tested && !(memo->known && memo->gap > 2.0 * NEAR * b->structure->spacing))
+            find_deepest(b, x, &e);
     }
-    for (int k = 0; k < s->skin_triangles; k++, t += 5)
-        if (awake(b, t, t + 5)) depth = fmax(depth, find_deepest(b, x, s->skin[k], 3, s->def.radius));
     if (!isnan(b->def.base)) find_base(b, x, 0.0);
-    return fmax(depth, base_depth(b, x));
 }

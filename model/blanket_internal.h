@@ -46,6 +46,7 @@ typedef struct morph_angle {
     double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
     double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
+    double wake;            /* path length (state.path) before which it cannot reach a limit */
 } morph_angle;
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
@@ -57,6 +58,12 @@ typedef struct morph_angle {
 #define MORPH_BLANKET_LENGTH_HELD 1e-9
 #define MORPH_BLANKET_CLEARANCE_HELD 1e-3
 #define MORPH_BLANKET_PANEL_HELD 1e-6
+
+/* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
+typedef struct morph_memo {
+    double corner[3][3], gap;
+    bool known;
+} morph_memo;
 
 /* How far the state is from its limits; violations are >= 0. */
 typedef struct morph_violation {
@@ -92,7 +99,11 @@ typedef struct morph_blanket_state {
     double (*bound)[2];      /* links: the limits that hold: the structure's, or the prescribed lengths */
     double (*limit)[2];      /* links: what the projection aims at, a little inside */
     double (*push)[2];       /* links: accumulated corrections of this step at the two limits */
+    double *link_wake;       /* links: path length before which it cannot reach a limit */
+    int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
+    int near_links, near_angles;
     morph_angle *angle;
+    morph_memo *memo; /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
@@ -129,6 +140,10 @@ double morph_blanket_lift(const morph_blanket_def *def, double clock);
 
 /* blanket_project.c */
 morph_status morph_blanket_limits_create(morph_blanket_state *b);
+/* Lists the lengths and angles that can reach a limit while joints move by up to `move` and what sweeps add.
+ * What is far is not looked at again before the joints have moved enough; `all`: look at every one, whatever
+ * was noted, and note nothing. */
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all);
 /* Applies `warm` times the corrections of the last step to x (0: forgets them): at rest every step needs the
  * same ones, so that a few sweeps a step converge over many steps. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
@@ -148,14 +163,19 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x);
 morph_status morph_blanket_touches_create(morph_blanket_state *b);
 /* After x was set from outside: forgets what is far, and the last step's corrections. */
 void morph_blanket_forget(morph_blanket_state *b);
+/* Longest motion of a joint from `before` to x, m. */
+double morph_blanket_moved(const morph_blanket_state *b, const double *x);
 /* Lists the contacts near x; `before` in the state is where friction counts from. */
 void morph_blanket_find_contacts(morph_blanket_state *b, const double *x);
 /* Planes of the listed contacts anew at x, corrections kept. */
 void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x);
 /* Deepest violation of a place's radius or the base plane at x, m, >= 0. */
 double morph_blanket_depth(const morph_blanket_state *b, const double *x);
-/* The same by exact distances over whole links and triangles, listed as contacts on the way. */
-double morph_blanket_find_exact(morph_blanket_state *b, const double *x);
+/* The same by exact distances over whole links and triangles. An element that has moved less than its last
+ * distance left over is not measured again. */
+double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
+/* Lists the contacts near x by exact distances. */
+void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
 /* Part of project_start; most: largest push to start with, m. */
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */

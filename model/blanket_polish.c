@@ -52,9 +52,13 @@ morph_violation morph_blanket_violation(const morph_blanket_state *b, const doub
 static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int rounds) {
     for (int round = 0;; round++) {
         morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
-        if (exact) v.clearance = morph_blanket_find_exact(b, x);
+        if (exact) v.clearance = morph_blanket_depth_exact(b, x);
         if (held(b, &v) || round == rounds) return v;
-        if (!exact) morph_blanket_find_contacts(b, x);
+        if (exact)
+            morph_blanket_find_exact(b, x);
+        else
+            morph_blanket_find_contacts(b, x);
+        morph_blanket_list_limits(b, x, 0.0, true);
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)
             morph_blanket_sweep(b, x, (sweep & 1) != 0, 0.0);

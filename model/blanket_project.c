@@ -7,6 +7,9 @@
 #define LENGTH_MARGIN 1e-3 /* spacings */
 #define ANGLE_MARGIN 0.01  /* radians */
 
+/* What sweeps may move a joint by beyond its step, spacings: limits closer than that are listed. */
+#define SWEEPS_ADD 0.02
+
 /* Weights of joints that one correction is taken to carry at rest, at most. */
 #define MOST_CARRIED 16.0
 
@@ -43,6 +46,10 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
     b->spare_push = morph_alloc((size_t)b->links, sizeof *b->spare_push);
     b->spare_angle = morph_alloc((size_t)b->angles, sizeof *b->spare_angle);
+    b->link_wake = morph_alloc((size_t)b->links, sizeof *b->link_wake);
+    b->near_link = morph_alloc((size_t)b->links, sizeof *b->near_link);
+    b->near_angle = morph_alloc((size_t)b->angles, sizeof *b->near_angle);
+    if (!b->link_wake || !b->near_link || !b->near_angle) return MORPH_ERR_NOMEM;
     if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
         return MORPH_ERR_NOMEM;
     for (int l = 0; l < b->links; l++) {
@@ -140,17 +147,21 @@ static void start_length(morph_blanket_state *b, int l, double *x, double warm, 
     if (length > 0.0) part(b, ends, &x[3 * ends[0]], &x[3 * ends[1]], d, (push[0] - push[1]) / length);
 }
 
+static void arms(const morph_angle *a, const double *x, double u[3], double v[3]) {
+    for (int j = 0; j < a->joints; j++)
+        for (int k = 0; k < 3; k++) {
+            u[k] += a->su[j] * x[3 * a->joint[j] + k];
+            v[k] += a->sv[j] * x[3 * a->joint[j] + k];
+        }
+}
+
 /* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
  * su dc/du + sv dc/dv, times its weight. Returns the sum of the gradients' squares; 0 where the arms are
  * parallel, which the limits keep far from, or all joints are held. arm: the shorter arm's length. grad may
  * be NULL, then so may arm, and 0 is returned. */
 static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
     double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
-    for (int j = 0; j < a->joints; j++)
-        for (int k = 0; k < 3; k++) {
-            u[k] += a->su[j] * x[3 * a->joint[j] + k];
-            v[k] += a->sv[j] * x[3 * a->joint[j] + k];
-        }
+    arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
     if (!grad || !(scale > 0.0)) return 0.0;
@@ -169,6 +180,49 @@ double morph_blanket_cosine(const morph_angle *a, const double *x) {
     double c;
     cosine(a, x, &c, NULL, NULL);
     return c;
+}
+
+/* A length changes by at most twice what its joints move. */
+static bool link_near(morph_blanket_state *b, int l, const double *x, double near, bool note) {
+    const int *ends = b->structure->link[l];
+    const double length = morph_dist(&x[3 * ends[0]], &x[3 * ends[1]]);
+    const double spare = 0.5 * fmin(length - b->limit[l][0], b->limit[l][1] - length) - near;
+    if (note && spare > 0.0) b->link_wake[l] = b->path + spare;
+    return !(spare > 0.0);
+}
+
+/* With joints moving by m, arms of length a turn by at most 2 m / (a - 2 m) each and the cosine changes by at
+ * most their sum: it keeps a distance g where m <= g a / (4 + 2 g). */
+static bool angle_near(const morph_blanket_state *b, morph_angle *a, const double *x, double near,
+                       bool note) {
+    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+    arms(a, x, u, v);
+    const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
+    if (!(scale > 0.0)) return true;
+    const double c = morph_dot(u, v) / scale, gap = fmin(a->ceiling - c, c - a->floor);
+    const double spare = gap * sqrt(fmin(uu, vv)) / (4.0 + 2.0 * fmax(gap, 0.0)) - near;
+    if (note && spare > 0.0) a->wake = b->path + spare;
+    return !(spare > 0.0);
+}
+
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all) {
+    const double near = SWEEPS_ADD * b->structure->spacing + move;
+    b->near_links = b->near_angles = 0;
+    for (int l = 0; l < b->links; l++) {
+        if (!all && b->path + near < b->link_wake[l]) continue;
+        if (b->def.drive || link_near(b, l, x, near, !all))
+            b->near_link[b->near_links++] = l;
+        else
+            b->push[l][0] = b->push[l][1] = 0.0;
+    }
+    for (int t = 0; t < b->angles; t++) {
+        morph_angle *a = &b->angle[t];
+        if (!all && b->path + near < a->wake) continue;
+        if (angle_near(b, a, x, near, !all))
+            b->near_angle[b->near_angles++] = t;
+        else
+            a->push[0] = a->push[1] = 0.0;
+    }
 }
 
 static double clip(double value, double most) {
@@ -259,10 +313,10 @@ static void project_panel(const morph_blanket_state *b, int panel, double *x) {
  * last: their corrections are not kept, and contacts must not answer before they have. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm) {
     const double most = MOST_CARRIED * b->pull * b->step * b->step;
-    for (int t = 0; t < b->angles; t++)
-        start_angle(&b->angle[t], x, warm, most);
-    for (int l = 0; l < b->links; l++)
-        start_length(b, l, x, warm, most);
+    for (int t = 0; t < b->near_angles; t++)
+        start_angle(&b->angle[b->near_angle[t]], x, warm, most);
+    for (int l = 0; l < b->near_links; l++)
+        start_length(b, b->near_link[l], x, warm, most);
     morph_blanket_start_contacts(b, x, warm, most);
     project_posts(b, x);
 }
@@ -270,10 +324,10 @@ void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm)
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
  * angles yield where all cannot hold at once. */
 void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction) {
-    for (int t = 0; t < b->angles; t++)
-        project_angle(&b->angle[backward ? b->angles - 1 - t : t], x);
-    for (int l = 0; l < b->links; l++)
-        project_length(b, backward ? b->links - 1 - l : l, x);
+    for (int t = 0; t < b->near_angles; t++)
+        project_angle(&b->angle[b->near_angle[backward ? b->near_angles - 1 - t : t]], x);
+    for (int l = 0; l < b->near_links; l++)
+        project_length(b, b->near_link[backward ? b->near_links - 1 - l : l], x);
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
         project_panel(b, backward ? panels - 1 - p : p, x);

@@ -89,8 +89,12 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->weight);
     free(b->bound);
     free(b->limit);
+    free(b->link_wake);
+    free(b->near_link);
+    free(b->near_angle);
     free(b->push);
     free(b->angle);
+    free(b->memo);
     free(b->touch);
     free(b->contact);
     free(b->hold);
