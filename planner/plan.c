@@ -237,6 +237,48 @@ static morph_status stage_measure(planner *p) {
     return status;
 }
 
+/* What lasts longer than this is no morph that anybody waits for, and its replay would take minutes. */
+#define LONGEST_REPLAY 120.0 /* s */
+
+/* What the lengths alone do: once as the scene says the structure is carried, once over the target as a solid
+ * core. */
+static morph_status stage_replay(planner *p) {
+    morph_summary *s = &p->plan->summary;
+    morph_record *r = &p->plan->record;
+    if (p->stopped) return MORPH_OK;
+    if (s->duration > LONGEST_REPLAY) {
+        morph_log(control_of(p), "replay: left out, a schedule of %.0f s is too long", s->duration);
+        return MORPH_OK;
+    }
+    const double since = morph_seconds();
+    const bool on_target = p->work.structure->def.support == MORPH_SUPPORT_TARGET;
+    morph_replay_input in = {p->work.structure, p->scene, p->work.cavity,     NULL,     NULL,
+                             r->samples,        0.0,      r->schedule_joints, r->length};
+    in.step = r->samples > 1 ? r->time[1] - r->time[0] : p->scene->sample;
+    morph_status status = MORPH_OK;
+    for (int core = on_target ? 1 : 0; core < 2 && status == MORPH_OK; core++) {
+        morph_trajectory t;
+        in.core = core ? p->work.sdf : NULL;
+        in.exact = core ? p->work.exact : NULL;
+        status = morph_replay_run(&in, control_of(p), &t, core && !on_target ? &s->replay_core : &s->replay);
+        if (status == MORPH_OK && core && !on_target)
+            morph_record_replay(&t, &r->core_frames, &r->core_time, &r->core_joints);
+        else if (status == MORPH_OK)
+            morph_record_replay(&t, &r->replay_frames, &r->replay_time, &r->replay_joints);
+    }
+    if (status == MORPH_ERR_STOPPED) {
+        p->stopped = true;
+        status = MORPH_OK;
+    }
+    /* A schedule that throws the structure about until no number is left is a finding, not our failure. */
+    if (status == MORPH_ERR_NONFINITE) {
+        morph_log(control_of(p), "replay: the lengths throw the structure about without bound");
+        status = MORPH_OK;
+    }
+    note_time(p, MORPH_STAGE_REPLAY, since);
+    return status;
+}
+
 /* The check alone decides; a duration that cannot be met makes the plan infeasible too. */
 static morph_status stage_check(planner *p) {
     const double since = morph_seconds();
@@ -279,8 +321,9 @@ static void describe(planner *p) {
 }
 
 static morph_status run_stages(planner *p) {
-    static morph_status (*const stages[])(planner *) = {stage_target, stage_nominal, stage_refine, stage_path,
-                                                        stage_timing, stage_measure, stage_check};
+    static morph_status (*const stages[])(planner *) = {stage_target, stage_nominal, stage_refine,
+                                                        stage_path,   stage_timing,  stage_measure,
+                                                        stage_replay, stage_check};
     morph_status status = MORPH_OK;
     for (size_t k = 0; k < sizeof stages / sizeof *stages && status == MORPH_OK; k++) {
         status = stages[k](p);

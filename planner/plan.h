@@ -47,6 +47,8 @@ morph_status morph_record_structure(morph_record *r, const morph_structure *s, c
 morph_status morph_record_nominal(morph_record *r, const morph_structure *s, const morph_trajectory *t);
 morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, const morph_timing *timing,
                                    double sample);
+/* Frames of a replay, moved into *time and *joints; t keeps nothing of them. */
+void morph_record_replay(morph_trajectory *t, int *frames, double **time, double **joints);
 morph_status morph_record_mobility(morph_record *r, const morph_structure *s);
 
 #endif

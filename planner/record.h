@@ -45,6 +45,9 @@ typedef struct morph_record {
     /* schedule/ */
     int samples;
     double *time, *schedule_joints, *length, *rate, *acceleration;
+    /* replay/: by lengths alone, without the target and with it as a solid core */
+    int replay_frames, core_frames;
+    double *replay_time, *replay_joints, *core_time, *core_joints;
     /* mobility/ */
     int mobility_samples;
     int *mobility_sample, *mobility_rank, *mobility_free, *mobility_redundant;

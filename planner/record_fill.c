@@ -53,6 +53,8 @@ morph_status morph_record_nominal(morph_record *r, const morph_structure *s, con
         !r->offset_nominal)
         return MORPH_ERR_NOMEM;
     for (int f = 0; f < t->frames; f++)
+        r->offset_nominal[3 * f + 2] = t->lift[f];
+    for (int f = 0; f < t->frames; f++)
         morph_link_lengths(s, &t->x[(size_t)f * width], &r->nominal_lengths[(size_t)f * (size_t)s->links]);
     return MORPH_OK;
 }
@@ -95,6 +97,14 @@ morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, co
     free(by_s);
     free(by_t);
     return ok ? MORPH_OK : MORPH_ERR_NOMEM;
+}
+
+void morph_record_replay(morph_trajectory *t, int *frames, double **time, double **joints) {
+    *frames = t->frames;
+    *time = t->time;
+    *joints = t->x;
+    t->time = t->x = NULL;
+    morph_trajectory_free(t);
 }
 
 morph_status morph_record_mobility(morph_record *r, const morph_structure *s) {

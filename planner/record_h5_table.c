@@ -18,6 +18,8 @@ enum {
     FRAMES,
     POSES,
     SAMPLES,
+    REPLAYED,
+    CORE,
     MOBILITY
 };
 
@@ -35,6 +37,8 @@ const size_t morph_record_counts[] = {
     [FRAMES] = offsetof(morph_record, nominal_frames),
     [POSES] = offsetof(morph_record, poses),
     [SAMPLES] = offsetof(morph_record, samples),
+    [REPLAYED] = offsetof(morph_record, replay_frames),
+    [CORE] = offsetof(morph_record, core_frames),
     [MOBILITY] = offsetof(morph_record, mobility_samples),
 };
 const int morph_record_count_total = (int)(sizeof morph_record_counts / sizeof morph_record_counts[0]);
@@ -113,6 +117,13 @@ const morph_dataset morph_record_datasets[] = {
           "exact second derivative of the lengths by time"),
     REAL2("target/offset_schedule", offset_schedule, SAMPLES, -1, 3, false, "m",
           "how far the target stands from its vertices at each sample"),
+    REAL1("replay/time", replay_time, REPLAYED, false, "s",
+          "times of the replay: the schedule's lengths prescribed, no target"),
+    REAL3("replay/joints", replay_joints, REPLAYED, JOINTS, "m", "joint positions of the replay"),
+    REAL1("replay_core/time", core_time, CORE, false, "s",
+          "times of the replay with the target as a solid core"),
+    REAL3("replay_core/joints", core_joints, CORE, JOINTS, "m",
+          "joint positions of the replay with the target as a solid core"),
     MOBILE("mobility/sample", mobility_sample, OF(SAMPLES), "1",
            "samples of the schedule that were examined"),
     MOBILE("mobility/rank", mobility_rank, ANY, "1", "rank of the rows of links (locked), posts and panels"),

@@ -9,8 +9,8 @@
 #include <string.h>
 
 const char *morph_stage_name(morph_stage stage) {
-    static const char *const names[MORPH_STAGES] = {"target", "nominal", "refine", "path",
-                                                    "timing", "measure", "check",  "write"};
+    static const char *const names[MORPH_STAGES] = {"target",  "nominal", "refine", "path", "timing",
+                                                    "measure", "replay",  "check",  "write"};
     int k = (int)stage;
     return k >= 0 && k < MORPH_STAGES ? names[k] : "unknown";
 }
@@ -53,16 +53,34 @@ static cJSON *put_object(builder *b, cJSON *at, const char *key) {
     return keep(b, cJSON_AddObjectToObject(at, key));
 }
 
-/* {blanket, plan}; a method that gave no result is null. */
-static void put_pair(builder *b, cJSON *at, const char *key, const morph_summary *s, double blanket,
-                     double plan) {
-    cJSON *object = put_object(b, at, key);
-    put_number(b, object, "blanket", s->has_blanket ? blanket : (double)NAN);
-    put_number(b, object, "plan", s->has_plan ? plan : (double)NAN);
+/* What is measured alike: blanket, plan, and where the lengths alone lead. NULL: it gave no result. */
+typedef struct measured {
+    const char *name;
+    const morph_measure *measure;
+} measured;
+enum { MEASURED = 4 };
+
+static void list_measured(const morph_summary *s, measured list[MEASURED]) {
+    list[0] = (measured){"blanket", s->has_blanket ? &s->blanket : NULL};
+    list[1] = (measured){"plan", s->has_plan ? &s->plan : NULL};
+    list[2] = (measured){"replay", s->replay.done ? &s->replay.measure : NULL};
+    list[3] = (measured){"replay_core", s->replay_core.done ? &s->replay_core.measure : NULL};
 }
 
-static void put_gap(builder *b, cJSON *at, const char *key, bool present, const morph_measure *m) {
-    if (!present) {
+/* One number of each, by its place in the measure. */
+static void put_each(builder *b, cJSON *at, const char *key, const morph_summary *s, size_t field) {
+    measured list[MEASURED];
+    list_measured(s, list);
+    cJSON *object = put_object(b, at, key);
+    for (int k = 0; k < MEASURED; k++) {
+        double value = NAN;
+        if (list[k].measure) memcpy(&value, (const char *)list[k].measure + field, sizeof value);
+        put_number(b, object, list[k].name, value);
+    }
+}
+
+static void put_gap(builder *b, cJSON *at, const char *key, const morph_measure *m) {
+    if (!m) {
         keep(b, cJSON_AddNullToObject(at, key));
         return;
     }
@@ -74,13 +92,30 @@ static void put_gap(builder *b, cJSON *at, const char *key, bool present, const 
 }
 
 static void put_measures(builder *b, cJSON *root, const morph_summary *s) {
-    put_pair(b, root, "cavity_volume", s, s->blanket.volume, s->plan.volume);
+    measured list[MEASURED];
+    list_measured(s, list);
+    put_each(b, root, "cavity_volume", s, offsetof(morph_measure, volume));
     put_number(b, root, "target_volume", s->target_volume);
-    put_pair(b, root, "objective", s, s->blanket.objective, s->plan.objective);
+    put_each(b, root, "objective", s, offsetof(morph_measure, objective));
     cJSON *gap = put_object(b, root, "gap");
-    put_gap(b, gap, "blanket", s->has_blanket, &s->blanket);
-    put_gap(b, gap, "plan", s->has_plan, &s->plan);
-    put_pair(b, root, "coverage", s, s->blanket.coverage, s->plan.coverage);
+    for (int k = 0; k < MEASURED; k++)
+        put_gap(b, gap, list[k].name, list[k].measure);
+    put_each(b, root, "coverage", s, offsetof(morph_measure, coverage));
+}
+
+/* What the lengths alone do to the structure: distances to the plan's end with rigid motion removed. */
+static void put_replay(builder *b, cJSON *root, const char *key, const morph_replay_report *r) {
+    if (!r->done) {
+        keep(b, cJSON_AddNullToObject(root, key));
+        return;
+    }
+    cJSON *replay = put_object(b, root, key);
+    put_number(b, replay, "distance_rms", r->rms);
+    put_number(b, replay, "distance_max", r->most);
+    put_number(b, replay, "worst_length", r->length);
+    put_number(b, replay, "time", r->seconds_of_run);
+    put_bool(b, replay, "at_rest", r->at_rest);
+    put_bool(b, replay, "gravity", !r->floating);
 }
 
 static void put_margins(builder *b, cJSON *root, const morph_summary *s) {
@@ -156,6 +191,8 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, root, "spacing", s->spacing);
     put_measures(b, root, s);
     put_margins(b, root, s);
+    put_replay(b, root, "replay", &s->replay);
+    put_replay(b, root, "replay_core", &s->replay_core);
     cJSON *mobility = put_object(b, root, "mobility");
     put_number(b, mobility, "free", s->free_motions);
     put_number(b, mobility, "redundant", s->redundant);

@@ -5,8 +5,9 @@
 #include "model/blanket.h"
 #include "model/cavity.h"
 #include "planner/check.h"
+#include "planner/replay.h"
 
-enum { MORPH_STAGES = 8 };
+enum { MORPH_STAGES = 9 };
 typedef enum morph_stage {
     MORPH_STAGE_TARGET,
     MORPH_STAGE_NOMINAL,
@@ -14,6 +15,7 @@ typedef enum morph_stage {
     MORPH_STAGE_PATH,
     MORPH_STAGE_TIMING,
     MORPH_STAGE_MEASURE,
+    MORPH_STAGE_REPLAY,
     MORPH_STAGE_CHECK,
     MORPH_STAGE_WRITE
 } morph_stage;
@@ -40,6 +42,7 @@ typedef struct morph_summary {
     double total_seconds;
     long peak_memory_bytes;
     morph_blanket_report blanket_report;
+    morph_replay_report replay, replay_core; /* without the target, and with it as a solid */
     double sdf_cell, sdf_rms, sdf_max;
     char blas[64]; /* BLAS kernel name, "" if unknown */
     char warning[512];

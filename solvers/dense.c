@@ -23,3 +23,10 @@ morph_status morph_dense_solve(double *a, int n, double *b, int m) {
     if (info == LAPACK_WORK_MEMORY_ERROR || info == LAPACK_TRANSPOSE_MEMORY_ERROR) return MORPH_ERR_NOMEM;
     return info == 0 ? MORPH_OK : MORPH_ERR_BACKEND;
 }
+
+morph_status morph_symmetric_eigen(double *a, int n, double *w) {
+    for (int k = 0; k < n * n; k++)
+        if (!isfinite(a[k])) return MORPH_ERR_NONFINITE;
+    /* Column by column a symmetric matrix is the same, and the eigenvectors come out as our rows. */
+    return LAPACKE_dsyev(LAPACK_COL_MAJOR, 'V', 'U', n, a, n, w) == 0 ? MORPH_OK : MORPH_ERR_BACKEND;
+}

@@ -12,4 +12,8 @@ morph_status morph_singular_values(double *a, int rows, int columns, double *sig
  * becomes X. MORPH_ERR_BACKEND if a is singular. */
 morph_status morph_dense_solve(double *a, int n, double *b, int m);
 
+/* Eigenvalues w[n], ascending, of a symmetric a (n x n, row by row); a's rows become the eigenvectors.
+ * MORPH_ERR_NONFINITE for a NaN in a, MORPH_ERR_BACKEND if the iteration fails. */
+morph_status morph_symmetric_eigen(double *a, int n, double *w);
+
 #endif
