@@ -2,21 +2,23 @@
 #include "model/settle_internal.h"
 
 #include <string.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 /* Drag of the first step in loads per spacing: free fall then moves a quarter of a spacing. */
 #define FIRST_DRAG 4.0
-#define LEAST_DRAG 1e-9
+#define LEAST_DRAG 1e-6
 /* A joint moves this far in a Newton step and in an implicit step, at most (spacings): contacts within twice
  * the second are listed. */
 #define MOST_NEWTON 0.2
 #define MOST_MOVE 0.4
 /* Newton stops once the gradient is this part of the step's first: the multipliers are renewed after it. */
 #define FORCING 0.1
-enum { MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 };
+enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 };
 /* Violation of limits that counts as held: a tenth of what lengths are checked to elsewhere, in spacings. */
 #define HELD 1e-7
 /* Penalties grow where an update leaves more than a quarter of a violation, to at most this. */
-#define MOST_PENALTY 1e6
+#define MOST_PENALTY 1e5
 /* Kick that leaves a balanced but unstable shape, in spacings. */
 #define KICK 2e-3
 
@@ -69,20 +71,18 @@ static bool search(morph_settle *s, double energy, double slope, double scale) {
     return false;
 }
 
-/* Minimises the step's energy from s->x. *good: the gradient fell as far as asked. */
-static morph_status newton(morph_settle *s, bool *good) {
-    double first = 0.0;
+/* Minimises the step's energy from s->x. *good: the gradient fell as far as asked. Where Newton's step is far
+ * too long or finds no lower energy, the drag is raised: along motions that nothing resists, curved limits
+ * allow short steps only. */
+static morph_status newton(morph_settle *s, double target, bool *good) {
     *good = false;
     for (int k = 0;; k++) {
         double energy, most = 0.0, slope = 0.0;
-        if (k > 0) {
-            morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
-            *good = largest_force(s) <= fmax(FORCING * first, 0.3 * s->tolerance);
-            if (*good || k == MOST_NEWTONS || largest_move(s, s->x) > MOST_MOVE) return MORPH_OK;
-        }
+        morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
+        *good = largest_force(s) <= target;
+        if (*good || k == MOST_NEWTONS || largest_move(s, s->x) > MOST_MOVE) return MORPH_OK;
         morph_status status = factor(s, &energy);
         if (status != MORPH_OK) return status;
-        if (k == 0) first = largest_force(s);
         const double since = morph_seconds();
         status = morph_sparse_solve(s->sparse, s->g, s->d, NULL);
         s->linear_seconds += morph_seconds() - since;
@@ -92,7 +92,8 @@ static morph_status newton(morph_settle *s, bool *good) {
             slope += morph_dot(&s->g[3 * j], &s->d[3 * j]);
             most = fmax(most, morph_norm(&s->d[3 * j]));
         }
-        if (!search(s, energy, slope, most > MOST_NEWTON ? MOST_NEWTON / most : 1.0)) return MORPH_OK;
+        const bool found = search(s, energy, slope, most > MOST_NEWTON ? MOST_NEWTON / most : 1.0);
+        if (!found || most > 10.0 * MOST_NEWTON) s->drag = fmin(10.0 * s->drag, 1e6);
     }
 }
 
@@ -125,39 +126,59 @@ static void kick(morph_settle *s, int saddle) {
     s->drag = FIRST_DRAG;
 }
 
-/* Steps grow while Newton follows and the shape moves little, and shrink where it does not. */
-static void next_drag(morph_settle *s, bool good, double move) {
-    if (!good || move > 0.75 * MOST_MOVE)
+/* One implicit step: Newton, multipliers and cones anew, until they hold well enough that friction has acted
+ * on the step's own motion (a contact made in this step holds from its second round on). Returns in *worst
+ * the violation left. */
+static morph_status step(morph_settle *s, double residual, double *worst, bool *good) {
+    const double target = fmax(FORCING * residual, 0.3 * s->tolerance);
+    for (int round = 0; round < MOST_ROUNDS; round++) {
+        const morph_status status = newton(s, target, good);
+        if (status != MORPH_OK) return status;
+        const double last = *worst;
+        if (*good || round == 0) *worst = morph_settle_update(s, s->x);
+        if (!*good) break;
+        morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
+        if (largest_force(s) <= 3.0 * target) break;
+        if (round > 0 && *worst > 0.25 * last && *worst > HELD) penalties(s, 4.0);
+    }
+    morph_settle_slide(s, s->x);
+    return MORPH_OK;
+}
+
+/* Steps grow as the forces left over fall, and shrink where Newton cannot follow. */
+static void next_drag(morph_settle *s, bool good, double move, double residual, double last) {
+    if (!good || move > 0.75 * MOST_MOVE || residual > 4.0 * last)
         s->drag *= 2.0;
-    else if (move < 0.3 * MOST_MOVE)
-        s->drag = fmax(LEAST_DRAG, s->drag / (move < 0.05 * MOST_MOVE ? 4.0 : 2.0));
+    else if (residual < 0.5 * last && move < 0.25 * MOST_MOVE)
+        s->drag = fmax(LEAST_DRAG, s->drag / 8.0);
+    else if (residual <= last && move < 0.5 * MOST_MOVE)
+        s->drag = fmax(LEAST_DRAG, s->drag / 2.0);
 }
 
 static morph_status run(morph_settle *s, const morph_control *control, morph_settle_report *r) {
-    double worst = INFINITY, last, move = INFINITY;
+    double worst = INFINITY, move = INFINITY, last = INFINITY;
+    bool good = true;
     s->drag = FIRST_DRAG;
     s->exact_after = 0;
     for (r->steps = 0; r->steps < s->most_steps; r->steps++) {
-        bool good;
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
-        const double deep = morph_settle_seek(s, s->x, fmax(HELD, fmin(1e-3, 0.1 * move)));
+        const double deep = morph_settle_seek(s, s->x, fmax(5.0 * HELD, fmin(1e-3, 0.1 * move)));
         morph_settle_begin(s, s->x);
         memcpy(s->before, s->x, 3 * (size_t)s->joints * sizeof(double));
         r->residual = residual(s);
-        if (r->residual <= s->tolerance && fmax(worst, deep) <= 2.0 * HELD) {
+        if (r->residual <= s->tolerance && worst <= HELD && deep <= 10.0 * HELD) {
             r->converged = true;
             const morph_status status = morph_settle_examine(s, &r->stable);
             if (status != MORPH_OK || r->stable || r->saddles == MOST_SADDLES) return status;
             kick(s, r->saddles++);
             r->converged = false;
         }
-        const morph_status status = newton(s, &good);
+        if (r->steps > 0) next_drag(s, good, move, r->residual, last);
+        last = r->residual;
+        const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
         if (status != MORPH_OK) return status;
-        last = worst;
-        worst = morph_settle_update(s, s->x);
         move = largest_move(s, s->x);
-        if (move < 1e-2 && worst > 0.25 * last && worst > HELD) penalties(s, 4.0);
-        next_drag(s, good, move);
+        if (getenv("TRACE")) fprintf(stderr, "%d it %d res %.2e worst %.2e deep %.2e move %.2e drag %.2e good %d stiff %.1e E %.8f\n", r->steps, s->iterations, r->residual, worst, deep, move, s->drag, good, s->stiff, morph_settle_evaluate(s,s->x,MORPH_SETTLE_VALUE));
     }
     return MORPH_OK;
 }

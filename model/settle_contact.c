@@ -13,7 +13,11 @@
 enum { LATTICE = 4 };
 #define LEAST_STRIDE 1e-4
 /* A seeker this close in weight to a new deepest point moves there and takes its force along. */
-#define SAME_PLACE 0.2
+#define SAME_PLACE 0.02
+
+/* Kinetic friction in parts of static friction: what has slid comes to rest inside its cone, so that the last
+ * small changes of a contact's force do not set it sliding again. */
+#define KINETIC 0.9
 
 static void add_place(morph_settle *s, const int *joint, int corners, const double *weight, double radius) {
     morph_settle_place *p = &s->place[s->places++];
@@ -191,35 +195,43 @@ void morph_settle_begin(morph_settle *s, const double *x) {
         if (!p->used) continue;
         place_of(x, p->joint, p->corners, p->weight, q);
         p->near = p->push > 0.0 || gap_of(s, p, q, NULL, NULL) < NEAR;
-        if (!(p->push > 0.0 && s->friction > 0.0)) continue;
+        if (!p->near || s->friction == 0.0) continue;
         gap_of(s, p, q, g, NULL);
-        const double slope = morph_norm(g);
-        if (!(slope > 0.0)) continue;
+        p->slope = morph_norm(g);
+        if (!(p->slope > 0.0)) continue; /* a ridge: no direction, and a cone of 0 */
         for (int k = 0; k < 3; k++)
-            p->normal[k] = g[k] / slope;
+            p->normal[k] = g[k] / p->slope;
         const double off = morph_dot(p->slip, p->normal);
         for (int k = 0; k < 3; k++)
             p->anchor[k] = q[k] - (p->slip[k] - off * p->normal[k]);
-        p->cone = s->friction * p->push * slope;
+        p->cone = s->friction * p->push * p->slope;
     }
 }
 
-/* The friction spring keeps the stretch that its new cone allows. */
 static void new_slip(const morph_settle *s, morph_settle_place *p, const double q[3]) {
     double u[3];
-    if (p->push == 0.0 || p->cone == 0.0) {
-        memset(p->slip, 0, sizeof p->slip);
-        return;
-    }
     morph_sub(q, p->anchor, u);
     const double off = morph_dot(u, p->normal);
     for (int k = 0; k < 3; k++)
         u[k] -= off * p->normal[k];
-    const double way = morph_norm(u), most = s->friction * p->push / s->grip;
+    const double way = morph_norm(u), most = p->cone / s->grip;
     for (int k = 0; k < 3; k++)
-        p->slip[k] = way > most ? u[k] * most / way : u[k];
+        p->slip[k] = way > most ? u[k] * KINETIC * most / way : u[k];
 }
 
+void morph_settle_slide(morph_settle *s, const double *x) {
+    for (int n = 0; n < s->places; n++) {
+        morph_settle_place *p = &s->place[n];
+        double q[3];
+        if (p->near && p->cone > 0.0) {
+            place_of(x, p->joint, p->corners, p->weight, q);
+            new_slip(s, p, q);
+        } else
+            memset(p->slip, 0, sizeof p->slip);
+    }
+}
+
+/* With the forces the cones follow. */
 double morph_settle_update_contacts(morph_settle *s, const double *x) {
     double worst = 0.0;
     for (int n = 0; n < s->places; n++) {
@@ -229,8 +241,8 @@ double morph_settle_update_contacts(morph_settle *s, const double *x) {
         place_of(x, p->joint, p->corners, p->weight, q);
         const double gap = gap_of(s, p, q, NULL, NULL);
         p->push = fmax(0.0, p->push - s->stiff * gap);
+        p->cone = s->friction * p->push * p->slope;
         worst = fmax(worst, -gap);
-        new_slip(s, p, q);
     }
     return worst;
 }

@@ -27,12 +27,13 @@ typedef struct morph_settle_place {
     double push;      /* multiplier, >= 0 */
     double slip[3];   /* stretch of the friction spring */
     double normal[3]; /* at the step's start */
+    double slope;     /* of the distance there */
     double anchor[3]; /* where the friction spring hangs in this step */
     double cone;      /* most friction in this step */
 } morph_settle_place;
 
 /* Places per element that look for its deepest points. */
-enum { MORPH_SETTLE_SEEKERS = 3 };
+enum { MORPH_SETTLE_SEEKERS = 6 };
 
 /* An element that is searched for its deepest point: a triangle or a link that is no edge of one. */
 typedef struct morph_settle_element {
@@ -121,6 +122,8 @@ double morph_settle_contacts(morph_settle *s, const double *x, morph_settle_orde
 /* Lists what is near, and hangs up the friction springs, for a step from x. */
 void morph_settle_begin(morph_settle *s, const double *x);
 double morph_settle_update_contacts(morph_settle *s, const double *x);
+/* Ends a step at x: friction springs keep the stretch that their cones allow. */
+void morph_settle_slide(morph_settle *s, const double *x);
 /* Moves or adds places where an element is deeper than `tolerance`; returns the deepest violation found. */
 double morph_settle_seek(morph_settle *s, const double *x, double tolerance);
 

@@ -63,7 +63,7 @@ void morph_settle_scale(morph_settle *s, const morph_attractor *attractor) {
         for (int k = 0; k < 3; k++)
             s->place[n].slip[k] *= change;
     }
-    s->stiff = s->grip = PENALTY;
+    s->stiff = PENALTY, s->grip = 10000.0;
     s->stiff_angle = ANGLE_PENALTY;
     s->stiff_length = fmax(s->stiff, s->spring);
 }

@@ -2,8 +2,8 @@
  *
  * For a box and a sphere under grids of 4 x 4, 8 x 8 and 16 x 16 (springs of 20 N/m, friction 0.4, the target
  * scaled with the grid as in examples/scenes): seconds of both, their ratio, the mean gap and the potential
- * energy of both ends, Newton iterations, factorisations, analyses, the linear solver's share; then settle from
- * the dynamics' end, and warm from its own.
+ * energy of both ends, Newton iterations, factorisations, analyses, the linear solver's share; then settle
+ * from the dynamics' end, and warm from its own.
  */
 #include "model/blanket.h"
 #include "model/cavity.h"
@@ -55,7 +55,8 @@ static bool make(scene *s, int nodes, bool sphere) {
     const double size[3] = {0.5 * width, 0.5 * width, 0.3 * width}, r = 0.3 * width;
     const double radii[3] = {r, r, r};
     morph_mesh mesh = {0};
-    const morph_status status = sphere ? morph_mesh_ellipsoid(radii, 1e-3, &mesh) : morph_mesh_box(size, &mesh);
+    const morph_status status =
+        sphere ? morph_mesh_ellipsoid(radii, 1e-3, &mesh) : morph_mesh_box(size, &mesh);
     const bool good = status == MORPH_OK && place(s, &mesh, sphere ? 2.0 * r : size[2]);
     morph_mesh_free(&mesh);
     return good;
@@ -83,11 +84,12 @@ static void settle_line(const char *name, scene *s, morph_settle *settle, bool w
     (void)before;
     const morph_status status = morph_settle_run(settle, s->x, warm, NULL, &r);
     line(name, s, settle, r.seconds);
-    printf("%s%s%s: %.2f of the dynamics; %d steps, %d iterations, %d factorisations so far, %d analysis, "
-           "linear solver %.0f %%, %d contacts, %d saddles\n",
-           status == MORPH_OK ? "" : morph_status_text(status), r.converged ? "converged" : "NOT converged",
-           r.stable ? ", stable" : "", r.seconds / dynamics, r.steps, r.iterations, r.factorisations, r.analyses,
-           100.0 * r.linear_seconds / r.seconds, r.contacts, r.saddles);
+    printf(
+        "%s%s%s: %.2f of the dynamics; %d steps, %d iterations, %d factorisations so far, %d analysis, "
+        "linear solver %.0f %%, %d contacts, %d saddles\n",
+        status == MORPH_OK ? "" : morph_status_text(status), r.converged ? "converged" : "NOT converged",
+        r.stable ? ", stable" : "", r.seconds / dynamics, r.steps, r.iterations, r.factorisations, r.analyses,
+        100.0 * r.linear_seconds / r.seconds, r.contacts, r.saddles);
     printf("                 residual %.1e weights, length %.1e m, post %.1e, angle %.1e, clearance %.1e m\n",
            r.residual, r.worst_length, r.worst_post, r.worst_angle, r.worst_clearance);
 }
