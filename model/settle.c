@@ -1,0 +1,259 @@
+/* Settle's run: implicit steps, Newton's iteration within one, the end. */
+#include "model/settle_internal.h"
+
+#include <string.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Drag of the first step in loads per spacing: free fall then moves a quarter of a spacing. */
+#define FIRST_DRAG 4.0
+#define LEAST_DRAG 1e-6
+/* A joint moves this far in a Newton step and in an implicit step, at most (spacings): contacts within twice
+ * the second are listed. */
+#define MOST_NEWTON 0.2
+#define MOST_MOVE 0.4
+/* Newton stops once the gradient is this part of the step's first: the multipliers are renewed after it. */
+#define FORCING 0.1
+enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 };
+/* Violation of limits that counts as held: a tenth of what lengths are checked to elsewhere, in spacings. */
+#define HELD 1e-7
+/* Penalties grow where an update leaves more than a quarter of a violation, to at most this. */
+#define MOST_PENALTY 1e5
+/* Kick that leaves a balanced but unstable shape, in spacings. */
+#define KICK 2e-3
+
+static double largest_force(const morph_settle *s) {
+    double most = 0.0;
+    for (int j = 0; j < s->joints; j++)
+        most = fmax(most, morph_norm(&s->g[3 * j]));
+    return most;
+}
+
+static double largest_move(const morph_settle *s, const double *to) {
+    double most = 0.0;
+    for (int j = 0; j < s->joints; j++)
+        most = fmax(most, morph_dist(&to[3 * j], &s->before[3 * j]));
+    return most;
+}
+
+/* Factors the Hessian at x: the exact one where it is positive definite, else its safe part (which drag makes
+ * so). A failed try costs a factorisation, so the next ones come later. */
+static morph_status factor(morph_settle *s, double *energy) {
+    int column = 0;
+    const bool exact = s->exact_after <= 0;
+    *energy = morph_settle_evaluate(s, s->x, exact ? MORPH_SETTLE_EXACT : MORPH_SETTLE_SAFE);
+    if (!isfinite(*energy)) return MORPH_ERR_NONFINITE;
+    s->exact_after--;
+    double since = morph_seconds();
+    morph_status status = morph_sparse_factor(s->sparse, s->value, &column);
+    s->linear_seconds += morph_seconds() - since;
+    if (status != MORPH_OK || column < 0 || !exact)
+        return status == MORPH_OK && column >= 0 ? MORPH_ERR_NONFINITE : status;
+    s->exact_after = 5;
+    morph_settle_evaluate(s, s->x, MORPH_SETTLE_SAFE);
+    since = morph_seconds();
+    status = morph_sparse_factor(s->sparse, s->value, &column);
+    s->linear_seconds += morph_seconds() - since;
+    return status == MORPH_OK && column >= 0 ? MORPH_ERR_NONFINITE : status;
+}
+
+/* Armijo's rule by halving; energies closer than rounding count as equal. */
+static bool search(morph_settle *s, double energy, double slope, double scale) {
+    const double noise = 1e-13 * (1.0 + fabs(energy));
+    for (int k = 0; k < MOST_HALVINGS; k++, scale *= 0.5) {
+        for (int i = 0; i < 3 * s->joints; i++)
+            s->trial[i] = s->x[i] - scale * s->d[i];
+        const double there = morph_settle_evaluate(s, s->trial, MORPH_SETTLE_VALUE);
+        if (!(there <= energy - 1e-4 * scale * slope + noise)) continue;
+        memcpy(s->x, s->trial, 3 * (size_t)s->joints * sizeof(double));
+        return true;
+    }
+    return false;
+}
+
+/* Minimises the step's energy from s->x. *good: the gradient fell as far as asked. Where Newton's step is far
+ * too long or finds no lower energy, the drag is raised: along motions that nothing resists, curved limits
+ * allow short steps only. */
+static morph_status newton(morph_settle *s, double target, bool *good) {
+    *good = false;
+    for (int k = 0;; k++) {
+        double energy, most = 0.0, slope = 0.0;
+        morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
+        *good = largest_force(s) <= target;
+        if (*good || k == MOST_NEWTONS || largest_move(s, s->x) > MOST_MOVE) return MORPH_OK;
+        morph_status status = factor(s, &energy);
+        if (status != MORPH_OK) return status;
+        const double since = morph_seconds();
+        status = morph_sparse_solve(s->sparse, s->g, s->d, NULL);
+        s->linear_seconds += morph_seconds() - since;
+        if (status != MORPH_OK) return status;
+        s->iterations++;
+        for (int j = 0; j < s->joints; j++) {
+            slope += morph_dot(&s->g[3 * j], &s->d[3 * j]);
+            most = fmax(most, morph_norm(&s->d[3 * j]));
+        }
+        const bool found = search(s, energy, slope, most > MOST_NEWTON ? MOST_NEWTON / most : 1.0);
+        if (!found || most > 10.0 * MOST_NEWTON) s->drag = fmin(10.0 * s->drag, 1e6);
+    }
+}
+
+/* Forces left over with the multipliers as they are, without drag. */
+static double residual(morph_settle *s) {
+    const double drag = s->drag;
+    s->form = MORPH_SETTLE_PLAIN;
+    s->drag = 0.0;
+    morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
+    s->form = MORPH_SETTLE_AUGMENTED;
+    s->drag = drag;
+    return largest_force(s);
+}
+
+static void penalties(morph_settle *s, double factor) {
+    if (s->stiff >= MOST_PENALTY) return;
+    s->stiff *= factor;
+    s->stiff_length *= factor;
+    s->stiff_angle *= factor;
+}
+
+/* Knuth's generator: the same kick on every machine. */
+static void kick(morph_settle *s, int saddle) {
+    unsigned long long state = 88172645463325252ull + (unsigned long long)saddle;
+    for (int i = 0; i < 3 * s->joints; i++) {
+        state = state * 6364136223846793005ull + 1442695040888963407ull;
+        const double share = (double)(state >> 11) / 9007199254740992.0;
+        if (!s->fixed[i / 3]) s->x[i] += KICK * (2.0 * share - 1.0);
+    }
+    s->drag = FIRST_DRAG;
+}
+
+/* One implicit step: Newton, multipliers and cones anew, until they hold well enough that friction has acted
+ * on the step's own motion (a contact made in this step holds from its second round on). Returns in *worst
+ * the violation left. */
+static morph_status step(morph_settle *s, double residual, double *worst, bool *good) {
+    const double target = fmax(FORCING * residual, 0.3 * s->tolerance);
+    for (int round = 0; round < MOST_ROUNDS; round++) {
+        const morph_status status = newton(s, target, good);
+        if (status != MORPH_OK) return status;
+        const double last = *worst;
+        if (*good || round == 0) *worst = morph_settle_update(s, s->x);
+        if (!*good) break;
+        morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
+        if (largest_force(s) <= 3.0 * target) break;
+        if (round > 0 && *worst > 0.25 * last && *worst > HELD) penalties(s, 4.0);
+    }
+    morph_settle_slide(s, s->x);
+    return MORPH_OK;
+}
+
+/* Steps grow as the forces left over fall, and shrink where Newton cannot follow. */
+static void next_drag(morph_settle *s, bool good, double move, double residual, double last) {
+    if (!good || move > 0.75 * MOST_MOVE || residual > 4.0 * last)
+        s->drag *= 2.0;
+    else if (residual < 0.5 * last && move < 0.25 * MOST_MOVE)
+        s->drag = fmax(LEAST_DRAG, s->drag / 8.0);
+    else if (residual <= last && move < 0.5 * MOST_MOVE)
+        s->drag = fmax(LEAST_DRAG, s->drag / 2.0);
+}
+
+static morph_status run(morph_settle *s, const morph_control *control, morph_settle_report *r) {
+    double worst = INFINITY, move = INFINITY, last = INFINITY;
+    bool good = true;
+    s->drag = FIRST_DRAG;
+    s->exact_after = 0;
+    for (r->steps = 0; r->steps < s->most_steps; r->steps++) {
+        if (morph_stopped(control)) return MORPH_ERR_STOPPED;
+        const double deep = morph_settle_seek(s, s->x, fmax(5.0 * HELD, fmin(1e-3, 0.1 * move)));
+        morph_settle_begin(s, s->x);
+        memcpy(s->before, s->x, 3 * (size_t)s->joints * sizeof(double));
+        r->residual = residual(s);
+        if (r->residual <= s->tolerance && worst <= HELD && deep <= 10.0 * HELD) {
+            r->converged = true;
+            const morph_status status = morph_settle_examine(s, &r->stable);
+            if (status != MORPH_OK || r->stable || r->saddles == MOST_SADDLES) return status;
+            kick(s, r->saddles++);
+            r->converged = false;
+        }
+        if (r->steps > 0) next_drag(s, good, move, r->residual, last);
+        last = r->residual;
+        const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
+        if (status != MORPH_OK) return status;
+        move = largest_move(s, s->x);
+        if (getenv("TRACE")) fprintf(stderr, "%d it %d res %.2e worst %.2e deep %.2e move %.2e drag %.2e good %d stiff %.1e E %.8f\n", r->steps, s->iterations, r->residual, worst, deep, move, s->drag, good, s->stiff, morph_settle_evaluate(s,s->x,MORPH_SETTLE_VALUE));
+    }
+    return MORPH_OK;
+}
+
+double morph_settle_energy(const morph_settle *s, const double *x) {
+    const morph_structure *st = s->structure;
+    double energy = 0.0;
+    for (int j = 0; j < s->joints; j++) {
+        double at[3];
+        for (int k = 0; k < 3; k++)
+            at[k] = x[3 * j + k] / s->length_unit;
+        energy += s->weight * at[2];
+        for (int m = 0; m < s->attractors; m++)
+            energy += morph_attraction(&s->attractor[m], s->softening, at, NULL, NULL);
+    }
+    for (int l = 0; l < st->links; l++) {
+        const double stretch =
+            (morph_dist(&x[3 * st->link[l][0]], &x[3 * st->link[l][1]]) - st->start_length[l]) /
+            s->length_unit;
+        energy += 0.5 * s->spring * stretch * stretch;
+    }
+    return energy * s->load * s->length_unit;
+}
+
+/* By the shape alone: the solver's own figures do not enter. */
+static void measure(morph_settle *s, const double *x, morph_settle_report *r) {
+    const morph_structure *st = s->structure;
+    for (int l = 0; l < st->links; l++) {
+        const double length = morph_dist(&x[3 * st->link[l][0]], &x[3 * st->link[l][1]]);
+        r->worst_length =
+            fmax(r->worst_length, fmax(st->length_limit[l][0] - length, length - st->length_limit[l][1]));
+    }
+    for (int p = 0; p < st->posts; p++) {
+        const double length = morph_dist(&x[3 * st->post[p][0]], &x[3 * st->post[p][1]]);
+        r->worst_post = fmax(r->worst_post, fabs(length / st->post_length[p] - 1.0));
+    }
+    for (int t = 0; t < s->angles; t++) {
+        const double c = morph_settle_angle_value(&s->angle[t], x);
+        r->worst_angle = fmax(r->worst_angle, fmax(s->angle[t].floor - c, c - s->angle[t].ceiling));
+    }
+    r->worst_clearance = s->length_unit * morph_settle_seek(s, s->x, INFINITY);
+    for (int j = 0; j < s->joints && !isnan(s->base); j++)
+        r->worst_clearance =
+            fmax(r->worst_clearance, s->base * s->length_unit + st->def.radius - x[3 * j + 2]);
+    for (int n = 0; n < s->places; n++)
+        r->contacts += s->place[n].push > MORPH_SETTLE_LEAST_PUSH;
+    r->energy = morph_settle_energy(s, x);
+    r->load = s->load;
+    if (s->weight > 0.0) r->residual /= s->weight;
+}
+
+morph_status morph_settle_run(morph_settle *s, double *x, bool warm, const morph_control *control,
+                              morph_settle_report *report) {
+    const double since = morph_seconds();
+    morph_settle_report r = {0};
+    for (int k = 0; k < 3 * s->joints; k++)
+        if (!isfinite(x[k])) return MORPH_ERR_NONFINITE;
+    for (int k = 0; k < 3 * s->joints; k++)
+        s->x[k] = x[k] / s->length_unit;
+    s->factored = false;
+    s->iterations = 0;
+    s->linear_seconds = 0.0;
+    if (!warm) morph_settle_forget(s);
+    const morph_status status = run(s, control, &r);
+    if (status == MORPH_OK || status == MORPH_ERR_STOPPED) {
+        for (int k = 0; k < 3 * s->joints; k++)
+            x[k] = s->x[k] * s->length_unit;
+        measure(s, x, &r);
+    }
+    const morph_sparse_size size = morph_sparse_sizes(s->sparse);
+    r.iterations = s->iterations;
+    r.factorisations = size.factorisations;
+    r.analyses = size.analyses;
+    r.linear_seconds = s->linear_seconds;
+    r.seconds = morph_seconds() - since;
+    if (report) *report = r;
+    return status;
+}
