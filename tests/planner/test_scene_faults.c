@@ -166,6 +166,20 @@ static const bad_case cases[] = {
     {5, "  spacing: 0.1\n  fixed: [[0, 0], [4, 0]]", 6, "structure.fixed[1][0]",
      "4 is too large, allowed: a whole number"},
     {5, "  spacing: 0.1\n  fixed: [3]", 6, "structure.fixed[0]", "3, allowed: a list of 2"},
+    {5, "  spacing: 0.1\n  fixed: {node: [1, 1]}", 6, "structure.fixed", "a mapping is not known"},
+    {5, "  spacing: 0.1\n  fixed: [[0, 5]]", 6, "structure.fixed[0][1]",
+     "5 is too large, allowed: a whole number from 0 to 4"},
+    {5, "  spacing: 0.1\n  fixed: [[-1, 0]]", 6, "structure.fixed[0][0]", "-1 is too small"},
+    {5, "  spacing: 0.1\n  fixed: [[0.5, 0]]", 6, "structure.fixed[0][0]", "0.5 is no whole number"},
+    {5, "  spacing: 0.1\n  fixed:\n    - [3, 4]\n    - [0, 0]\n    - [3, 4]", 9, "structure.fixed[2]",
+     "[3, 4] is given twice, first in line 7, allowed: once"},
+    {5, "  spacing: 0.1\n  bracing: cross", 6, "structure.bracing", "allowed: none, web, full"},
+    {5, "  spacing: 0.1\n  support: table", 6, "structure.support", "allowed: base, frame, target"},
+    {5, "  spacing: 0.1\n  layout: offset\n  joints: universal", 7, "structure.joints",
+     "universal joints have their axes along posts, allowed with layout offset: ball"},
+    {5, "  spacing: 0.1\n  layout: offset\n  bracing: web", 7, "structure.bracing",
+     "web braces panels between posts, allowed with layout offset (braced by itself): none"},
+    {4, "  nodes: [2, 5]\n  layout: offset", 4, "structure.nodes", "without a cell, allowed: at least 3"},
     /* links */
     {7, "    radius: -1", 7, "structure.link.radius", "-1 is negative"},
     {7, "    radius: 0.03", 7, "structure.link.radius", "links of radius 0.03 touch"},
@@ -195,6 +209,9 @@ static const bad_case cases[] = {
     {7, "    stuck: 3", 7, "structure.link.stuck", "3, allowed: a list of link numbers"},
     {7, "    stuck: [0, 62]", 7, "structure.link.stuck[1]",
      "62 is too large, allowed: a whole number from 0 to 61"},
+    {7, "    stuck: [62]\n  bracing: web", 7, "structure.link.stuck",
+     "not available yet: structure.link.stuck: "},
+    {7, "    stuck: [93]\n  bracing: web", 7, "structure.link.stuck[0]", "a whole number from 0 to 92"},
     {7, "    stuck: [-1]", 7, "structure.link.stuck[0]", "-1 is too small"},
     /* angles */
     {9, "    link_post: [55, 180.5]", 9, "structure.angle.link_post[1]",
@@ -230,7 +247,14 @@ static const bad_case cases[] = {
     {12, "  size: [1, 1, 1]\n  at: [0, 0, inf]", 13, "target.at[2]", "inf is not finite"},
     {12, "  size: [1, 1, 1]\n  at: [0, 0, -1]", 13, "target.at", "below the base"},
     {12, "  size: [1, 1, 1]\n  deformable: 5", 13, "target.deformable", "5 is no mapping"},
-    {12, "  size: [1, 1, 1]\n  deformable: {young: -1}", 13, "target.deformable.young", "-1 is negative"},
+    {12, "  size: [1, 1, 1]\n  deformable: {young: -1, density: 300}", 13, "target.deformable.young",
+     "-1 is negative, allowed: a number above 0 and at most 1e+15 Pa"},
+    {12, "  size: [1, 1, 1]\n  deformable: {young: 1, density: 0}", 13, "target.deformable.density",
+     "0 is too small"},
+    {12, "  size: [1, 1, 1]\n  deformable:\n    young: 1", 13, "target.deformable.density",
+     "is missing, allowed: a number above 0"},
+    {12, "  size: [1, 1, 1]\n  deformable: {young: 1, density: .nan}", 13, "target.deformable.density",
+     "not finite"},
     /* base, motion */
     {13, "base: floor", 13, "base", "floor is no number"},
     {13, "base: nan", 13, "base", "nan is not finite"},
@@ -252,6 +276,21 @@ static const bad_case cases[] = {
      "motion.touch[0].layer", "did you mean top?"},
     {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 1, to: 1}", 16,
      "motion.touch[0].to", "1 is not after from"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 2, to: 1.5}", 16,
+     "motion.touch[0].to", "1.5 is not after from, allowed: more than 2 s"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: -1, to: 1}", 16,
+     "motion.touch[0].from", "-1 is negative"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, nan], from: 0, to: 1}", 16,
+     "motion.touch[0].force[2]", "nan is not finite"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 1], from: 0, to: 1}", 16,
+     "motion.touch[0].force", "a list of 2, allowed: a list of 3"},
+    {15, "  touch:\n    - {node: [1, 0], force: [0, 0, 1], from: 0, to: 1}", 16, "motion.touch[0].layer",
+     "is missing, allowed: bottom, top"},
+    {15,
+     "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 0, to: 1}\n"
+     "    - {layer: top, force: [0, 0, 1], from: 0, to: 1}",
+     17, "motion.touch[1].node", "is missing"},
+    {15, "  mode: rise\n  height: 0", 16, "motion.height", "0 lets the target rise by nothing"},
     {15, "  touch:\n    - {node: [1, 0], layer: top, from: 0, to: 1}", 16, "motion.touch[0].force",
      "is missing"},
     {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 0, to: 1, forse: 1}", 16,
@@ -261,6 +300,12 @@ static const bad_case cases[] = {
     {16, "attractors:\n  - {at: [0, 0], strength: 1}", 17, "attractors[0].at",
      "a list of 2, allowed: a list of 3"},
     {16, "attractors:\n  - {at: [0, 0, 0], strength: -1}", 17, "attractors[0].strength", "-1 is negative"},
+    {16, "attractors:\n  - {at: [0, 0, 0], strength: inf}", 17, "attractors[0].strength", "not finite"},
+    {16, "attractors:\n  - {at: [0, 0, 0], strength: 1}\n  - {strength: 1}", 18, "attractors[1].at",
+     "is missing, allowed: a list of 3 numbers"},
+    {16, "attractors:\n  - {at: [0, 0, 0], strength: 1, power: 2}", 17, "attractors[0].power",
+     "unknown key, allowed: at, strength"},
+    {16, "attractors: {at: [0, 0, 0], strength: 1}", 16, "attractors", "a mapping is not known"},
     {16, "attractors:\n  - {at: [0, 0, 0]}", 17, "attractors[0].strength", "is missing"},
     {17, "start: [1]", 17, "start", "a list of 1 is no text"},
     {18, "goal:\n  coverage: 1.1", 19, "goal.coverage", "1.1 is too large"},
@@ -274,31 +319,8 @@ static const bad_case cases[] = {
     {20, "  sample: 0", 20, "schedule.sample", "0 is too small"},
     {20, "  samples: 1", 20, "schedule.samples", "did you mean sample?"},
     /* understood, but of a later version */
-    {5, "  spacing: 0.1\n  layout: offset", 6, "structure.layout",
-     "not available yet: structure.layout: offset"},
-    {5, "  spacing: 0.1\n  joints: universal", 6, "structure.joints",
-     "not available yet: structure.joints: universal"},
-    {5, "  spacing: 0.1\n  bracing: web", 6, "structure.bracing",
-     "not available yet: structure.bracing: web"},
-    {5, "  spacing: 0.1\n  bracing: full", 6, "structure.bracing",
-     "not available yet: structure.bracing: full"},
-    {5, "  spacing: 0.1\n  fixed: border", 6, "structure.fixed",
-     "not available yet: structure.fixed: border"},
-    {5, "  spacing: 0.1\n  fixed: [[0, 0], [3, 4]]", 6, "structure.fixed",
-     "not available yet: structure.fixed: "},
-    {5, "  spacing: 0.1\n  support: frame", 6, "structure.support",
-     "not available yet: structure.support: frame"},
-    {5, "  spacing: 0.1\n  support: target", 6, "structure.support",
-     "not available yet: structure.support: target"},
     {7, "    force: [-50, 50]", 7, "structure.link.force", "not available yet: structure.link.force: "},
     {7, "    stuck: [0, 61]", 7, "structure.link.stuck", "not available yet: structure.link.stuck: "},
-    {12, "  size: [1, 1, 1]\n  deformable: {young: 2.0e4, density: 300}", 13, "target.deformable",
-     "not available yet: target.deformable: "},
-    {15, "  mode: rise", 15, "motion.mode", "not available yet: motion.mode: rise"},
-    {15, "  touch:\n    - {node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}", 15,
-     "motion.touch", "not available yet: motion.touch: "},
-    {16, "attractors:\n  - {at: [0, 0, 0], strength: 1}", 16, "attractors",
-     "not available yet: attractors: "},
     {17, "start: other.plan", 17, "start", "not available yet: start: other.plan"},
     {18, "goal:\n  coverage: 0.9", 18, "goal", "not available yet: goal: "},
 };
@@ -319,6 +341,37 @@ static void test_cases(void **state) {
         }
     }
     print_message("%zu bad scenes\n", sizeof cases / sizeof *cases);
+}
+
+/* Nodes of the smaller layer of an offset grid; a layout that is not known bounds them by the larger. */
+static void test_layer_nodes(void **state) {
+    (void)state;
+    static const struct {
+        const char *layout, *touch;
+        const char *phrase; /* NULL: good */
+    } cases[] = {
+        {"posts", "node: [3, 4], layer: bottom", NULL},
+        {"offset", "node: [3, 4], layer: top", NULL},
+        {"offset", "node: [2, 3], layer: bottom", NULL},
+        {"offset", "node: [3, 3], layer: bottom", "[0]: 3 is too large, allowed: a whole number from 0 to 2"},
+        {"offset", "node: [2, 4], layer: bottom", "[1]: 4 is too large, allowed: a whole number from 0 to 3"},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char text[600];
+        snprintf(text, sizeof text,
+                 "morphplan: 1\nstructure: {nodes: [4, 5], spacing: 0.1, layout: %s}\n"
+                 "target: {shape: box, size: [0.1, 0.1, 0.1]}\n"
+                 "motion:\n  touch:\n    - {%s, force: [0, 0, 1], from: 0, to: 1}\n",
+                 cases[k].layout, cases[k].touch);
+        morph_scene *scene;
+        faults.count = 0;
+        const morph_status status =
+            morph_scene_parse("s.yaml", text, strlen(text), keep, ignore, &faults, &scene);
+        assert_int_equal(status, cases[k].phrase ? MORPH_ERR_INPUT : MORPH_OK);
+        assert_int_equal(faults.count, cases[k].phrase ? 1 : 0);
+        if (cases[k].phrase) assert_non_null(strstr(faults.text[0], cases[k].phrase));
+        morph_scene_destroy(scene);
+    }
 }
 
 /* The unchanged scene is good: the cases fail for their own line only. */
@@ -352,14 +405,13 @@ static void test_all_at_once(void **state) {
         "  sample: -1\n"
         "extra: 1\n";
     parse_bad(text, strlen(text));
-    assert_int_equal(faults.count, 10);
+    assert_int_equal(faults.count, 9);
     expect(1, "morphplan", "3");
     expect(3, "structure.nodes[0]", "1");
     expect(4, "structure.spacing", "x");
     expect(5, "structure.link.radius", "-1");
     expect(5, "structure.link.jerk", "nan");
     expect(8, "target.file", "");
-    expect(10, "motion.mode", "not available yet");
     expect(10, "motion.drag", "-1");
     expect(12, "schedule.sample", "-1");
     expect(13, "extra", "unknown key");
@@ -576,11 +628,11 @@ static void test_missing_files(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_control),       cmocka_unit_test(test_cases),
-        cmocka_unit_test(test_sections),      cmocka_unit_test(test_shapes),
-        cmocka_unit_test(test_all_at_once),   cmocka_unit_test(test_syntax),
-        cmocka_unit_test(test_hostile),       cmocka_unit_test(test_many_faults),
-        cmocka_unit_test(test_missing_files),
+        cmocka_unit_test(test_layer_nodes), cmocka_unit_test(test_control),
+        cmocka_unit_test(test_cases),       cmocka_unit_test(test_sections),
+        cmocka_unit_test(test_shapes),      cmocka_unit_test(test_all_at_once),
+        cmocka_unit_test(test_syntax),      cmocka_unit_test(test_hostile),
+        cmocka_unit_test(test_many_faults), cmocka_unit_test(test_missing_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
