@@ -1,4 +1,4 @@
-#include "model/structure.h"
+#include "model/structure_build.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,20 +39,18 @@ static bool def_ok(const morph_structure_def *d) {
     for (int k = 0; k < 3; k++)
         if (!pair_ok(d->length[k])) return false;
     if (d->nodes[0] < 2 || d->nodes[1] < 2 || d->nodes[0] > 1024 || d->nodes[1] > 1024) return false;
-    /* Layouts, joints and braces beyond the plain post grid have no builder here. */
-    return d->layout == MORPH_LAYOUT_POSTS && d->joints == MORPH_JOINTS_BALL &&
-           d->bracing == MORPH_BRACING_NONE && pair_ok(d->link_post) && pair_ok(d->link_link);
+    if (!pair_ok(d->link_post) || !pair_ok(d->link_link)) return false;
+    if (d->layout != MORPH_LAYOUT_OFFSET) return true;
+    return d->nodes[0] > 2 && d->nodes[1] > 2 && d->joints == MORPH_JOINTS_BALL &&
+           d->bracing == MORPH_BRACING_NONE;
 }
 
-static void count(morph_structure *s) {
-    const int nx = s->nx, ny = s->ny;
-    s->joints = 2 * nx * ny;
-    s->posts = nx * ny;
-    s->links = 2 * (2 * nx * ny - nx - ny);
-    s->link_posts = 2 * s->links;
-    s->link_links = 2 * 4 * (nx - 1) * (ny - 1);
-    s->skin_triangles = 2 * (nx - 1) * (ny - 1);
-    s->panels = 0;
+static bool fixed_ok(const morph_structure_def *d) {
+    if (d->fixed != MORPH_FIXED_LIST) return true;
+    if (d->fixed_nodes < 0 || (d->fixed_nodes > 0 && !d->fixed_node)) return false;
+    for (int k = 0; k < d->fixed_nodes; k++)
+        if (morph_node_joint(d, 1, d->fixed_node[k][0], d->fixed_node[k][1]) < 0) return false;
+    return true;
 }
 
 static bool allocate(morph_structure *s) {
@@ -75,132 +73,65 @@ static bool allocate(morph_structure *s) {
            (s->link_link_limit = morph_alloc(ll, sizeof(double[2]))) &&
            (s->skin = morph_alloc((size_t)s->skin_triangles, sizeof(int[3]))) &&
            (s->panel = morph_alloc((size_t)s->panels, sizeof(int[2]))) &&
-           (s->start = morph_alloc(3 * j, sizeof(double)));
+           (s->start = morph_alloc(3 * j, sizeof(double))) &&
+           (s->fixed = morph_alloc((size_t)s->fixed_count, sizeof(int))) &&
+           (s->fixed_joint = morph_alloc((size_t)s->fixed_joints, sizeof(int))) &&
+           (s->fixed_node = morph_alloc((size_t)s->def.fixed_nodes, sizeof(int[2])));
 }
 
-static int joint_at(const morph_structure *s, int layer, int i, int j) {
-    return (layer * s->ny + j) * s->nx + i;
-}
-
-static void place_joints(morph_structure *s) {
-    for (int layer = 0; layer < 2; layer++)
-        for (int j = 0; j < s->ny; j++)
-            for (int i = 0; i < s->nx; i++) {
-                const int n = joint_at(s, layer, i, j);
-                s->joint_layer[n] = layer;
-                s->joint_node[n][0] = i;
-                s->joint_node[n][1] = j;
-                s->start[3 * n] = (i - 0.5 * (s->nx - 1)) * s->spacing;
-                s->start[3 * n + 1] = (j - 0.5 * (s->ny - 1)) * s->spacing;
-                s->start[3 * n + 2] = layer * s->def.thickness;
-            }
-    for (int p = 0; p < s->posts; p++) {
-        s->post[p][0] = p;
-        s->post[p][1] = p + s->posts;
-        s->post_length[p] = s->def.thickness;
-    }
-}
-
-static void add_link(morph_structure *s, int *n, int a, int b, int kind) {
+/* Marks the joints of the nodes held (the top layer has them all) and counts what is held. */
+static void mark_fixed(morph_structure *s) {
     const morph_structure_def *d = &s->def;
-    const int l = (*n)++;
-    s->link[l][0] = a;
-    s->link[l][1] = b;
-    s->link_kind[l] = kind;
-    s->start_length[l] = morph_dist(&s->start[3 * a], &s->start[3 * b]);
-    s->length_limit[l][0] = d->length[kind][0];
-    s->length_limit[l][1] = d->length[kind][1];
-    s->rate_limit[l] = d->rate;
-    s->acceleration_limit[l] = d->acceleration;
-    s->jerk_limit[l] = d->jerk;
-    s->link_radius[l] = d->radius;
+    const int last[2] = {s->nx - 1, s->ny - 1};
+    const int top = s->joints - s->nx * s->ny;
+    for (int j = 0; j <= last[1]; j++)
+        for (int i = 0; i <= last[0]; i++) {
+            const bool x_end = i == 0 || i == last[0], y_end = j == 0 || j == last[1];
+            if ((d->fixed == MORPH_FIXED_BORDER && (x_end || y_end)) ||
+                (d->fixed == MORPH_FIXED_CORNERS && x_end && y_end))
+                s->joint_fixed[top + j * s->nx + i] = true;
+        }
+    for (int k = 0; k < d->fixed_nodes; k++)
+        s->joint_fixed[top + d->fixed_node[k][1] * s->nx + d->fixed_node[k][0]] = true;
+    for (int n = 0; n < s->nx * s->ny; n++)
+        s->fixed_count += s->joint_fixed[top + n];
+    for (int p = 0; p < s->posts; p++)
+        s->joint_fixed[p] = s->joint_fixed[top + p];
+    s->fixed_joints = s->posts > 0 ? 2 * s->fixed_count : s->fixed_count;
 }
 
-/* x_link[n], y_link[n]: the link that leaves joint n towards larger x or y, -1 at the border. */
-static void place_links(morph_structure *s, int *x_link, int *y_link) {
+static void list_fixed(morph_structure *s) {
     int n = 0;
-    for (int layer = 0; layer < 2; layer++)
-        for (int j = 0; j < s->ny; j++)
-            for (int i = 0; i < s->nx; i++) {
-                const int a = joint_at(s, layer, i, j);
-                x_link[a] = y_link[a] = -1;
-                if (i + 1 < s->nx) {
-                    x_link[a] = n;
-                    add_link(s, &n, a, joint_at(s, layer, i + 1, j), layer);
-                }
-                if (j + 1 < s->ny) {
-                    y_link[a] = n;
-                    add_link(s, &n, a, joint_at(s, layer, i, j + 1), layer);
-                }
-            }
-}
-
-static void add_corner(morph_structure *s, int *n, int joint, int link_a, int link_b) {
-    const int t = (*n)++;
-    s->link_link[t][0] = link_a;
-    s->link_link[t][1] = link_b;
-    s->link_link_joint[t] = joint;
-    s->link_link_limit[t][0] = s->def.link_link[0];
-    s->link_link_limit[t][1] = s->def.link_link[1];
-}
-
-static void place_angles(morph_structure *s, const int *x_link, const int *y_link) {
-    for (int l = 0, t = 0; l < s->links; l++)
-        for (int end = 0; end < 2; end++, t++) {
-            s->link_post[t][0] = l;
-            s->link_post[t][1] = s->link[l][end] % s->posts;
-            s->link_post_limit[t][0] = s->def.link_post[0];
-            s->link_post_limit[t][1] = s->def.link_post[1];
-        }
-    int t = 0;
-    for (int layer = 0; layer < 2; layer++)
-        for (int j = 0; j + 1 < s->ny; j++)
-            for (int i = 0; i + 1 < s->nx; i++) {
-                /* The cell's four links: near x, far x (y + 1), left y, right y (x + 1). */
-                const int a = joint_at(s, layer, i, j), b = joint_at(s, layer, i + 1, j);
-                const int c = joint_at(s, layer, i, j + 1), d = joint_at(s, layer, i + 1, j + 1);
-                add_corner(s, &t, a, x_link[a], y_link[a]);
-                add_corner(s, &t, b, x_link[a], y_link[b]);
-                add_corner(s, &t, c, x_link[c], y_link[a]);
-                add_corner(s, &t, d, x_link[c], y_link[b]);
-            }
-}
-
-static void place_skin(morph_structure *s) {
-    int t = 0;
-    for (int j = 0; j + 1 < s->ny; j++)
-        for (int i = 0; i + 1 < s->nx; i++) {
-            const int a = joint_at(s, 0, i, j), b = joint_at(s, 0, i + 1, j);
-            const int c = joint_at(s, 0, i, j + 1), d = joint_at(s, 0, i + 1, j + 1);
-            /* Diagonals run around the middle of the grid. A sheet that drapes over a bump shears its cells
-             * so that they grow long towards the middle: the diagonal across that is the short one, and
-             * triangles on it lie closer to what is beneath. */
-            const bool falling = (2 * i + 2 - s->nx) * (2 * j + 2 - s->ny) > 0;
-            const int even[2][3] = {{a, b, d}, {a, d, c}}, odd[2][3] = {{a, b, c}, {b, d, c}};
-            for (int k = 0; k < 2; k++, t++)
-                for (int m = 0; m < 3; m++)
-                    s->skin[t][m] = falling ? odd[k][m] : even[k][m];
-        }
+    for (int j = 0; j < s->joints; j++)
+        if (s->joint_fixed[j]) s->fixed_joint[n++] = j;
+    /* Posts carry the numbers of their bottom joints, which come first. */
+    for (int k = 0; k < s->fixed_count; k++)
+        s->fixed[k] = s->fixed_joint[k];
+    for (int k = 0; k < s->def.fixed_nodes; k++)
+        for (int c = 0; c < 2; c++)
+            s->fixed_node[k][c] = s->def.fixed_node[k][c];
+    s->def.fixed_node = (const int(*)[2])s->fixed_node;
 }
 
 morph_status morph_structure_create(const morph_structure_def *def, morph_structure **out) {
     *out = NULL;
-    if (!def_ok(def)) return MORPH_ERR_INPUT;
+    if (!def_ok(def) || !fixed_ok(def)) return MORPH_ERR_INPUT;
     morph_structure *s = calloc(1, sizeof *s);
     if (!s) return MORPH_ERR_NOMEM;
     s->def = *def;
+    if (def->fixed != MORPH_FIXED_LIST) s->def.fixed_nodes = 0;
     s->nx = def->nodes[0];
     s->ny = def->nodes[1];
     s->spacing = def->spacing;
-    count(s);
+    morph_structure_count(s);
     int *x_link = morph_alloc((size_t)s->joints, sizeof(int));
     int *y_link = morph_alloc((size_t)s->joints, sizeof(int));
-    const bool ok = allocate(s) && x_link && y_link;
+    bool ok = (s->joint_fixed = morph_alloc((size_t)s->joints, sizeof(bool))) && x_link && y_link;
+    if (ok) mark_fixed(s);
+    ok = ok && allocate(s);
     if (ok) {
-        place_joints(s);
-        place_links(s, x_link, y_link);
-        place_angles(s, x_link, y_link);
-        place_skin(s);
+        morph_structure_place(s, x_link, y_link);
+        list_fixed(s);
     }
     free(x_link);
     free(y_link);
@@ -233,6 +164,10 @@ void morph_structure_destroy(morph_structure *s) {
     free(s->link_link_limit);
     free(s->skin);
     free(s->panel);
+    free(s->fixed);
+    free(s->fixed_joint);
+    free(s->joint_fixed);
+    free(s->fixed_node);
     free(s->start);
     free(s);
 }

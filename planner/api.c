@@ -77,6 +77,17 @@ static char *default_folder(const char *scene) {
     return folder;
 }
 
+/* What the scene asks for and the method cannot do is refused before anything is written. */
+static int refuse_unsupported(const morph_scene *scene, const morph_job *job) {
+    char what[160];
+    if (morph_scene_supported(scene, job->method ? job->method : "ipopt", what, sizeof what))
+        return MORPH_EXIT_DONE;
+    char line[600];
+    snprintf(line, sizeof line, "%.400s: %s", scene->file, what);
+    say(job, line);
+    return MORPH_EXIT_INPUT;
+}
+
 static int plan_into(const morph_scene *scene, const char *folder, const morph_job *job, char **text,
                      char **json) {
     const morph_control control = {job->stop, job->progress, job->log, job->user};
@@ -121,6 +132,11 @@ int morph_plan_scene(const char *path, const morph_job *job, char **text, char *
     morph_scene *scene = NULL;
     int code = read_scene(path, job, &scene);
     if (code != MORPH_EXIT_DONE) return code;
+    code = refuse_unsupported(scene, job);
+    if (code != MORPH_EXIT_DONE) {
+        morph_scene_destroy(scene);
+        return code;
+    }
     char *own = job->folder ? NULL : default_folder(path);
     const char *folder = job->folder ? job->folder : own;
     code = folder ? plan_into(scene, folder, job, text, json) : fail(job, path, MORPH_ERR_NOMEM);

@@ -164,17 +164,21 @@ static void test_rest_of_pose(poses *p, int k, int i, double t) {
                            morph_element_of(MORPH_ELEMENT_JOINT, j), none);
 }
 
-/* Held posts stay where they start; 1e-6 of the spacing as for every equality. */
+/* Held posts (joints, where there are no posts) stay where they start; 1e-6 of the spacing as for every
+ * equality. */
 static void test_held(const morph_record *r, double h, morph_findings *f) {
+    const int ends = r->posts > 0 ? 2 : 1;
+    const morph_element_kind kind = r->posts > 0 ? MORPH_ELEMENT_POST : MORPH_ELEMENT_JOINT;
     for (int k = 1; k < r->samples; k++)
         for (int i = 0; i < r->fixed_count; i++)
-            for (int e = 0; e < 2; e++) {
-                const size_t at = 3 * (size_t)r->post[r->fixed[i]][e];
+            for (int e = 0; e < ends; e++) {
+                const int joint = r->posts > 0 ? r->post[r->fixed[i]][e] : r->fixed[i];
+                const size_t at = 3 * (size_t)joint;
                 const double *now = r->schedule_joints + (size_t)k * 3 * (size_t)r->joints + at;
                 const double moved = morph_dist(now, r->schedule_joints + at);
                 if (moved <= 1e-6 * r->spacing) continue;
                 char name[96];
-                morph_element_name(r, morph_element_of(MORPH_ELEMENT_POST, r->fixed[i]), name, sizeof name);
+                morph_element_name(r, morph_element_of(kind, r->fixed[i]), name, sizeof name);
                 morph_findings_defect(f, "%s is held, but has moved %.3g m at %.9g s", name, moved, k * h);
                 return;
             }

@@ -66,7 +66,8 @@ static bool topology(const morph_record *r, morph_findings *f) {
         return fault(f, "structure/skin has an index out of range");
     if (!indices(r->panel ? r->panel[0] : NULL, 2 * (size_t)r->panels, r->posts))
         return fault(f, "structure/panels has an index out of range");
-    if (!indices(r->fixed, (size_t)r->fixed_count, r->posts))
+    /* Without posts (layout offset) the joints held are listed. */
+    if (!indices(r->fixed, (size_t)r->fixed_count, r->posts > 0 ? r->posts : r->joints))
         return fault(f, "structure/fixed has an index out of range");
     return true;
 }

@@ -24,6 +24,7 @@ morph_status morph_record_structure(morph_record *r, const morph_structure *s, c
     r->link_links = s->link_links;
     r->skin_triangles = s->skin_triangles;
     r->panels = s->panels;
+    r->fixed_count = s->fixed_count;
     r->target_vertices = target->vertices;
     r->target_triangles = target->triangles;
     const bool ok =
@@ -38,7 +39,7 @@ morph_status morph_record_structure(morph_record *r, const morph_structure *s, c
         COPY(r->link_link, s->link_link, s->link_links) &&
         COPY(r->link_link_limit, s->link_link_limit, s->link_links) &&
         COPY(r->skin, s->skin, s->skin_triangles) && COPY(r->panel, s->panel, s->panels) &&
-        (r->fixed = morph_alloc(0, sizeof(int))) && COPY(r->target_v, target->v, 3 * target->vertices) &&
+        COPY(r->fixed, s->fixed, s->fixed_count) && COPY(r->target_v, target->v, 3 * target->vertices) &&
         COPY(r->target_t, target->t, 3 * target->triangles);
     return ok ? MORPH_OK : MORPH_ERR_NOMEM;
 }

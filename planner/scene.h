@@ -2,6 +2,7 @@
 #ifndef MORPH_SCENE_H
 #define MORPH_SCENE_H
 
+#include "model/attraction.h"
 #include "model/mesh.h"
 #include "model/structure.h"
 
@@ -34,6 +35,8 @@ typedef struct morph_target_def {
     double
         rotate[3]; /* radians about the fixed x, then y, then z axis, about the centre of the bounding box */
     double at[3];  /* where the centre of the bounding box goes, last */
+    bool has_deformable;
+    double young, density; /* Pa, kg/m3; 0 where the target is rigid */
 } morph_target_def;
 
 typedef enum morph_mode { MORPH_MODE_DROP, MORPH_MODE_RISE } morph_mode;
@@ -43,14 +46,22 @@ typedef struct morph_motion_def {
     double height, gravity, drag, friction, time;
 } morph_motion_def;
 
-/* auto: centres are placed by a later version, so both plan alike for now; a list of centres is refused. */
-typedef enum morph_attractors { MORPH_ATTRACT_AUTO, MORPH_ATTRACT_NONE } morph_attractors;
+/* auto: centres are placed by a later version, so auto and none plan alike for now. list: morph_scene.centre.
+ */
+typedef enum morph_attractors { MORPH_ATTRACT_AUTO, MORPH_ATTRACT_NONE, MORPH_ATTRACT_LIST } morph_attractors;
+
+/* The force of a user's hand on one joint, from <= t < to. */
+typedef struct morph_scene_touch {
+    int joint;       /* of the structure */
+    double force[3]; /* N */
+    double from, to; /* s */
+} morph_scene_touch;
 
 typedef struct morph_scene {
     char *file; /* path of the scene */
     char *title;
-    char sha256[65]; /* of the scene file's bytes, hexadecimal */
-    morph_structure_def structure;
+    char sha256[65];               /* of the scene file's bytes, hexadecimal */
+    morph_structure_def structure; /* its fixed_node points to fixed_node below */
     morph_target_def target_def;
     double base; /* NaN: none */
     morph_motion_def motion;
@@ -59,6 +70,10 @@ typedef struct morph_scene {
     double sample;     /* s */
     morph_mesh target; /* built, in world coordinates, mended */
     morph_mesh_report target_report;
+    int touches, centres;     /* as the scene lists them; 0 else */
+    morph_scene_touch *touch; /* touches */
+    morph_attractor *centre;  /* centres, of MORPH_ATTRACT_LIST */
+    int (*fixed_node)[2]; /* structure.fixed_nodes: structure.fixed as a list of nodes (i, j), each once */
 } morph_scene;
 
 /* Where faults go: one line each, "FILE:LINE: key: what is wrong, what is allowed". */
@@ -75,6 +90,11 @@ typedef void (*morph_fault_sink)(void *user, const char *line);
 morph_status morph_scene_read(const char *path, morph_fault_sink fault, morph_fault_sink warn, void *user,
                               morph_scene **out);
 void morph_scene_destroy(morph_scene *scene); /* NULL allowed */
+
+/* Can `method` ("ipopt", "blanket") plan this scene? If not, text names the first feature that it does not
+ * support, "not available yet: motion.mode: rise with --method ipopt"; else text is "". The blanket runs
+ * every scene that can be read. */
+bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size);
 
 /* The scene with every default written out, as YAML text (free with free()). mesh_file: what to write as
  * target.file (the copy beside it, relative to where the text will stand), NULL for shapes without one or to

@@ -1,5 +1,5 @@
-/* Sections whose features come later: read and validated, then refused by name, so that nothing that a scene
- * asks for is silently left out. */
+/* Lists of hands and centres; and sections whose features come later: read and validated, then refused by
+ * name, so that nothing that a scene asks for is silently left out. */
 #include "planner/scene_parts.h"
 
 #include <stdio.h>
@@ -33,28 +33,35 @@ static morph_value entry(const morph_value *list, int i, const char *allowed) {
     return item;
 }
 
-static void read_touch_entry(const morph_scene_reader *r, const morph_value *touch) {
-    static const char *const layers[2] = {"bottom", "top"};
-    const int *n = r->scene->structure.nodes;
-    const long least[2] = {0, 0}, most[2] = {r->nodes_known ? n[0] - 1 : 63, r->nodes_known ? n[1] - 1 : 63};
-    long node[2];
-    double force[3], from = 0.0, to = 0.0;
-    int layer;
-    const morph_value where = required(touch, "node", "a list of 2 node numbers");
-    morph_value_integers(&where, least, most, 2, node);
-    const morph_value side = required(touch, "layer", "bottom, top");
-    morph_value_choice(&side, layers, 2, &layer);
-    const morph_value push = required(touch, "force", "a list of 3 numbers, N");
-    morph_value_numbers(&push, &force_range, 3, force);
+/* A time window that is one. */
+static void read_window(const morph_value *touch, morph_scene_touch *out) {
     const morph_value begin = required(touch, "from", "a time in s"),
                       end = required(touch, "to", "a time in s");
-    const bool timed = morph_value_number(&begin, &moment_range, &from) == MORPH_FOUND;
-    if (morph_value_number(&end, &moment_range, &to) == MORPH_FOUND && timed && to <= from) {
-        char a[MORPH_NUMBER_TEXT], b[MORPH_NUMBER_TEXT];
-        morph_number_print(to, a);
-        morph_number_print(from, b);
-        morph_value_fault(&end, "%s is not after from, allowed: more than %s s", a, b);
-    }
+    const bool timed = morph_value_number(&begin, &moment_range, &out->from) == MORPH_FOUND;
+    if (morph_value_number(&end, &moment_range, &out->to) != MORPH_FOUND || !timed || out->to > out->from)
+        return;
+    char a[MORPH_NUMBER_TEXT], b[MORPH_NUMBER_TEXT];
+    morph_number_print(out->to, a);
+    morph_number_print(out->from, b);
+    morph_value_fault(&end, "%s is not after from, allowed: more than %s s", a, b);
+}
+
+static void read_touch_entry(const morph_scene_reader *r, const morph_value *touch, morph_scene_touch *out) {
+    static const char *const layers[2] = {"bottom", "top"};
+    const morph_structure_def *def = &r->scene->structure;
+    long node[2];
+    int layer = 1, n[2] = {64, 64};
+    const morph_value side = required(touch, "layer", "bottom, top");
+    const bool sided = morph_value_choice(&side, layers, 2, &layer) == MORPH_FOUND;
+    /* Without a known layer the larger one bounds the node. */
+    if (r->nodes_known && r->layout_known) morph_layer_nodes(def, layer, n);
+    const long least[2] = {0, 0}, most[2] = {n[0] - 1, n[1] - 1};
+    const morph_value where = required(touch, "node", "a list of 2 node numbers");
+    if (morph_value_integers(&where, least, most, 2, node) == MORPH_FOUND && sided)
+        out->joint = morph_node_joint(def, layer, (int)node[0], (int)node[1]);
+    const morph_value push = required(touch, "force", "a list of 3 numbers, N");
+    morph_value_numbers(&push, &force_range, 3, out->force);
+    read_window(touch, out);
 }
 
 void morph_scene_read_touch(morph_scene_reader *r, const morph_value *motion) {
@@ -66,39 +73,47 @@ void morph_scene_read_touch(morph_scene_reader *r, const morph_value *motion) {
         morph_value_fault(&touch, "%s, allowed: a list of mappings of node, layer, force, from, to", is);
         return;
     }
-    const int before = r->yaml.faults.count;
-    for (int i = 0; i < morph_value_count(&touch); i++) {
-        const morph_value item = entry(&touch, i, "node, layer, force, from, to");
-        if (item.node) read_touch_entry(r, &item);
+    morph_scene *scene = r->scene;
+    const int count = morph_value_count(&touch);
+    scene->touch = morph_alloc((size_t)count, sizeof *scene->touch);
+    if (!scene->touch) {
+        r->yaml.faults.nomem = true;
+        return;
     }
-    if (r->yaml.faults.count == before && morph_value_count(&touch) > 0)
-        morph_value_later(&touch, "forces of a hand");
+    scene->touches = count;
+    for (int i = 0; i < count; i++) {
+        const morph_value item = entry(&touch, i, "node, layer, force, from, to");
+        if (item.node) read_touch_entry(r, &item, &scene->touch[i]);
+    }
 }
 
-/* auto, none, or (not available yet) a list of centres. */
+/* auto, none, or a list of centres. */
 static void read_attractors(morph_scene_reader *r, const morph_value *root) {
     static const char *const names[2] = {"auto", "none"};
     const morph_value attractors = morph_value_get(root, "attractors");
+    morph_scene *scene = r->scene;
     int chosen = 0;
     if (!morph_value_is_list(&attractors)) {
         morph_value_choice(&attractors, names, 2, &chosen);
-        r->scene->attractors = chosen ? MORPH_ATTRACT_NONE : MORPH_ATTRACT_AUTO;
+        scene->attractors = chosen ? MORPH_ATTRACT_NONE : MORPH_ATTRACT_AUTO;
         return;
     }
-    const int before = r->yaml.faults.count;
-    for (int i = 0; i < morph_value_count(&attractors); i++) {
+    const int count = morph_value_count(&attractors);
+    scene->attractors = count > 0 ? MORPH_ATTRACT_LIST : MORPH_ATTRACT_NONE;
+    scene->centre = morph_alloc((size_t)count, sizeof *scene->centre);
+    if (!scene->centre) {
+        r->yaml.faults.nomem = true;
+        return;
+    }
+    scene->centres = count;
+    for (int i = 0; i < count; i++) {
         const morph_value item = entry(&attractors, i, "at, strength");
         if (!item.node) continue;
-        double at[3], strength;
         const morph_value place = required(&item, "at", "a list of 3 numbers, m");
-        morph_value_numbers(&place, &place_range, 3, at);
+        morph_value_numbers(&place, &place_range, 3, scene->centre[i].at);
         const morph_value pull = required(&item, "strength", "a number, N m2");
-        morph_value_number(&pull, &strength_range, &strength);
+        morph_value_number(&pull, &strength_range, &scene->centre[i].strength);
     }
-    if (morph_value_count(&attractors) == 0)
-        r->scene->attractors = MORPH_ATTRACT_NONE;
-    else if (r->yaml.faults.count == before)
-        morph_value_later(&attractors, "a list of centres");
 }
 
 static void read_start(const morph_value *root) {

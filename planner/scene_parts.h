@@ -12,6 +12,7 @@ typedef struct morph_scene_reader {
     bool nodes_known;   /* structure.nodes was read: node numbers may be checked */
     bool target_known;  /* the target's keys had no fault: it may be built */
     bool at_known;      /* target.at was read; else it follows from base and the shape's extent */
+    bool layout_known;  /* structure.layout was read or left out: which nodes a layer has may be checked */
 } morph_scene_reader;
 
 /* No length, mass, force ... of a scene is larger: squares and products of a few stay finite. */
@@ -19,9 +20,10 @@ typedef struct morph_scene_reader {
 
 /* The names of each enum, in its order. */
 extern const char *const morph_layout_names[2],
-    *const morph_joint_type_names[2], *const morph_bracing_names[3], *const morph_support_names[3],
-                                                                         *const morph_shape_names[9],
-                                                                             *const morph_mode_names[2];
+    *const morph_fixed_names[3], *const morph_joint_type_names[2], *const morph_bracing_names[3],
+                                                                       *const morph_support_names[3],
+                                                                           *const morph_shape_names[9],
+                                                                               *const morph_mode_names[2];
 
 /* A section: the mapping under key, its keys checked (unknown ones and duplicates are faults). node is NULL
  * if it is absent, empty or no mapping (a fault). */

@@ -210,6 +210,9 @@ void morph_scene_destroy(morph_scene *scene) {
     free(scene->target_def.file);
     free(scene->target_def.file_as_written);
     morph_mesh_free(&scene->target);
+    free(scene->touch);
+    free(scene->centre);
+    free(scene->fixed_node);
     free(scene);
 }
 
@@ -221,8 +224,7 @@ void morph_scene_read_motion(morph_scene_reader *r, const morph_value *root) {
 
     const morph_value mode = morph_value_get(&map, "mode");
     int chosen = 0;
-    if (morph_value_choice(&mode, morph_mode_names, 2, &chosen) == MORPH_FOUND && chosen > 0)
-        morph_value_later(&mode, morph_mode_names[chosen]);
+    morph_value_choice(&mode, morph_mode_names, 2, &chosen);
     motion->mode = (morph_mode)chosen;
 
     const struct {
@@ -238,8 +240,11 @@ void morph_scene_read_motion(morph_scene_reader *r, const morph_value *root) {
         morph_value_number(&value, numbers[k].range, numbers[k].out);
     }
     const morph_value height = morph_value_get(&map, "height");
-    if (morph_value_number(&height, &height_range, &motion->height) == MORPH_FOUND && r->spacing_known &&
-        motion->mode == MORPH_MODE_DROP && motion->height < scene->structure.radius) {
+    const morph_found found = morph_value_number(&height, &height_range, &motion->height);
+    if (found == MORPH_FOUND && motion->mode == MORPH_MODE_RISE && !(motion->height > 0.0))
+        morph_value_fault(&height, "0 lets the target rise by nothing, allowed: a number above 0 m");
+    if (found == MORPH_FOUND && r->spacing_known && motion->mode == MORPH_MODE_DROP &&
+        motion->height < scene->structure.radius) {
         char is[MORPH_NUMBER_TEXT], least[MORPH_NUMBER_TEXT];
         morph_number_print(motion->height, is);
         morph_number_print(scene->structure.radius, least);

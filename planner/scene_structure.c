@@ -8,6 +8,7 @@ const char *const morph_layout_names[2] = {"posts", "offset"};
 const char *const morph_joint_type_names[2] = {"ball", "universal"};
 const char *const morph_bracing_names[3] = {"none", "web", "full"};
 const char *const morph_support_names[3] = {"base", "frame", "target"};
+const char *const morph_fixed_names[3] = {"none", "border", "corners"};
 
 /* Two nodes make one cell; beyond 64 no plan would end in useful time. */
 enum { NODES_LEAST = 2, NODES_MOST = 64 };
@@ -31,12 +32,11 @@ static morph_found read_number(const morph_value *map, const char *key, const mo
     return morph_value_number(&value, range, out);
 }
 
-/* A choice of which only the first is available now; returns the index read (0 if absent or faulty). */
-static int read_first_only(const morph_value *map, const char *key, const char *const *names, int count) {
+/* The index read, 0 if absent or faulty. */
+static int read_choice(const morph_value *map, const char *key, const char *const *names, int count) {
     const morph_value value = morph_value_get(map, key);
     int chosen = 0;
-    if (morph_value_choice(&value, names, count, &chosen) == MORPH_FOUND && chosen > 0)
-        morph_value_later(&value, names[chosen]);
+    morph_value_choice(&value, names, count, &chosen);
     return chosen;
 }
 
@@ -55,8 +55,21 @@ static void settle_angles(double radians[2]) {
     }
 }
 
+/* A default length as its 15 digits: 0.75 times 0.1 is 0.075 and not 0.07500000000000001, which is another
+ * double and no shorter to write. */
+static void settle_length(double *length) {
+    char text[MORPH_NUMBER_TEXT];
+    snprintf(text, sizeof text, "%.15g", *length);
+    *length = strtod(text, NULL);
+}
+
 static void set_defaults(morph_structure_def *def, double spacing) {
     *def = morph_structure_defaults(spacing);
+    double *const lengths[] = {&def->thickness,    &def->length[0][0], &def->length[0][1],
+                               &def->length[1][0], &def->length[1][1], &def->radius,
+                               &def->rate,         &def->acceleration, &def->jerk};
+    for (size_t k = 0; k < sizeof lengths / sizeof *lengths; k++)
+        settle_length(lengths[k]);
     settle_angles(def->link_post);
     settle_angles(def->link_link);
 }
@@ -136,9 +149,7 @@ static void read_later_link_keys(morph_scene_reader *r, const morph_value *link)
         morph_value_fault(&stuck, "%s, allowed: a list of link numbers", is);
         return;
     }
-    /* Links of both layers: 2 (2 nx ny - nx - ny), without braces, which are not available either. */
-    const int *n = r->scene->structure.nodes;
-    const long links = r->nodes_known ? 2L * (2L * n[0] * n[1] - n[0] - n[1]) : 1000000L;
+    const long links = r->nodes_known && r->layout_known ? morph_link_count(&r->scene->structure) : 1000000L;
     bool good = true;
     for (int i = 0; i < morph_value_count(&stuck); i++) {
         const morph_value item = morph_value_item(&stuck, i);
@@ -192,27 +203,76 @@ static void read_angle(const morph_value *angle, const char *key, double out[2])
         out[k] = morph_radians(degrees[k]);
 }
 
-/* none, or (not available yet) border, corners, a list of nodes. */
-static void read_fixed(morph_scene_reader *r, const morph_value *structure) {
-    static const char *const names[3] = {"none", "border", "corners"};
-    const morph_value fixed = morph_value_get(structure, "fixed");
-    int chosen = 0;
-    if (!morph_value_is_list(&fixed)) {
-        if (!morph_value_is(&fixed, "none") && morph_value_choice(&fixed, names, 3, &chosen) == MORPH_FOUND)
-            morph_value_later(&fixed, names[chosen]);
-        return;
-    }
-    const int *n = r->scene->structure.nodes;
+/* The list of nodes held; each once, since a second time is a slip. */
+static void read_fixed_list(morph_scene_reader *r, const morph_value *fixed) {
+    morph_scene *scene = r->scene;
+    const int *n = scene->structure.nodes;
+    const int count = morph_value_count(fixed);
     const long least[2] = {0, 0};
     const long most[2] = {r->nodes_known ? n[0] - 1 : NODES_MOST - 1,
                           r->nodes_known ? n[1] - 1 : NODES_MOST - 1};
-    bool good = true;
-    for (int i = 0; i < morph_value_count(&fixed); i++) {
-        const morph_value item = morph_value_item(&fixed, i);
-        long node[2];
-        if (morph_value_integers(&item, least, most, 2, node) != MORPH_FOUND) good = false;
+    int line[NODES_MOST][NODES_MOST] = {{0}}, used = 0;
+    scene->fixed_node = morph_alloc((size_t)count, sizeof *scene->fixed_node);
+    if (!scene->fixed_node) {
+        r->yaml.faults.nomem = true;
+        return;
     }
-    if (good && morph_value_count(&fixed) > 0) morph_value_later(&fixed, "a list of nodes");
+    for (int i = 0; i < count; i++) {
+        const morph_value item = morph_value_item(fixed, i);
+        long node[2];
+        if (morph_value_integers(&item, least, most, 2, node) != MORPH_FOUND) continue;
+        int *first = &line[node[0]][node[1]];
+        if (*first > 0) {
+            morph_value_fault(&item, "[%ld, %ld] is given twice, first in line %d, allowed: once", node[0],
+                              node[1], *first);
+            continue;
+        }
+        *first = item.line;
+        for (int k = 0; k < 2; k++)
+            scene->fixed_node[used][k] = (int)node[k];
+        used++;
+    }
+    scene->structure.fixed = used > 0 ? MORPH_FIXED_LIST : MORPH_FIXED_NONE;
+    scene->structure.fixed_nodes = used;
+    scene->structure.fixed_node = (const int(*)[2])scene->fixed_node;
+}
+
+/* none, border, corners, or a list of nodes. */
+static void read_fixed(morph_scene_reader *r, const morph_value *structure) {
+    const morph_value fixed = morph_value_get(structure, "fixed");
+    int chosen = 0;
+    if (morph_value_is_list(&fixed)) {
+        read_fixed_list(r, &fixed);
+        return;
+    }
+    morph_value_choice(&fixed, morph_fixed_names, 3, &chosen);
+    r->scene->structure.fixed = (morph_fixed)chosen;
+}
+
+/* layout, joints, bracing, and what goes with an offset layout. */
+static void read_layout(morph_scene_reader *r, const morph_value *map) {
+    morph_structure_def *def = &r->scene->structure;
+    const morph_value layout = morph_value_get(map, "layout"), nodes = morph_value_get(map, "nodes");
+    const morph_value joints = morph_value_get(map, "joints"), bracing = morph_value_get(map, "bracing");
+    int chosen = 0;
+    r->layout_known = morph_value_choice(&layout, morph_layout_names, 2, &chosen) != MORPH_FAULTY;
+    def->layout = (morph_layout)chosen;
+    def->joints = (morph_joint_type)read_choice(map, "joints", morph_joint_type_names, 2);
+    def->bracing = (morph_bracing)read_choice(map, "bracing", morph_bracing_names, 3);
+    if (def->layout != MORPH_LAYOUT_OFFSET) return;
+    if (def->joints != MORPH_JOINTS_BALL)
+        morph_value_fault(&joints, "%s joints have their axes along posts, allowed with layout offset: ball",
+                          morph_joint_type_names[def->joints]);
+    if (def->bracing != MORPH_BRACING_NONE)
+        morph_value_fault(
+            &bracing, "%s braces panels between posts, allowed with layout offset (braced by itself): none",
+            morph_bracing_names[def->bracing]);
+    if (r->nodes_known && (def->nodes[0] < 3 || def->nodes[1] < 3))
+        morph_value_fault(
+            &nodes,
+            "[%d, %d] leaves the bottom layer of layout offset, one node smaller each way, without "
+            "a cell, allowed: at least 3",
+            def->nodes[0], def->nodes[1]);
 }
 
 void morph_scene_read_structure(morph_scene_reader *r, const morph_value *root) {
@@ -224,10 +284,8 @@ void morph_scene_read_structure(morph_scene_reader *r, const morph_value *root) 
     }
     morph_structure_def *def = &r->scene->structure;
     read_grid(r, &map);
-    def->layout = (morph_layout)read_first_only(&map, "layout", morph_layout_names, 2);
-    def->joints = (morph_joint_type)read_first_only(&map, "joints", morph_joint_type_names, 2);
-    def->bracing = (morph_bracing)read_first_only(&map, "bracing", morph_bracing_names, 3);
-    def->support = (morph_support)read_first_only(&map, "support", morph_support_names, 3);
+    read_layout(r, &map);
+    def->support = (morph_support)read_choice(&map, "support", morph_support_names, 3);
     read_number(&map, "thickness", &length_range, &def->thickness);
     read_number(&map, "mass", &mass_range, &def->mass);
     read_fixed(r, &map);

@@ -19,7 +19,8 @@ static const morph_range scale_range = {0.0, MORPH_SCENE_LARGEST, true, ""};
 static const morph_range place_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "m"};
 static const morph_range fit_range = {0.0, MORPH_SCENE_LARGEST, true, "m"};
 static const morph_range turn_range = {-360.0, 360.0, false, "degrees"};
-static const morph_range material_range = {0.0, 1e15, true, ""};
+static const morph_range young_range = {0.0, 1e15, true, "Pa"};
+static const morph_range density_range = {0.0, 1e15, true, "kg/m3"};
 
 /* The keys that belong to some shapes only; bit s is set where shape s has it. */
 #define BIT(s) (1u << (unsigned)(s))
@@ -155,13 +156,16 @@ static void read_placing(morph_scene_reader *r, const morph_value *target) {
     r->at_known = read_list(target, "at", &place_range, def->at) == MORPH_FOUND;
 }
 
-static void read_deformable(const morph_value *target) {
+/* Left out (or empty): rigid. */
+static void read_deformable(const morph_value *target, morph_target_def *def) {
+    static const char allowed[] = "is missing, allowed: a number above 0 and at most 1e+15 %s";
     const morph_value map = morph_scene_section(target, "deformable");
-    const int before = target->yaml->faults.count;
-    double unused;
-    read_number(&map, "young", &material_range, &unused);
-    read_number(&map, "density", &material_range, &unused);
-    if (map.node && target->yaml->faults.count == before) morph_value_later(&map, "a deformable target");
+    if (!map.node) return;
+    const morph_value young = morph_value_get(&map, "young"), density = morph_value_get(&map, "density");
+    if (!young.node) morph_value_fault(&young, allowed, "Pa");
+    if (!density.node) morph_value_fault(&density, allowed, "kg/m3");
+    const bool stiff = morph_value_number(&young, &young_range, &def->young) == MORPH_FOUND;
+    def->has_deformable = morph_value_number(&density, &density_range, &def->density) == MORPH_FOUND && stiff;
 }
 
 void morph_scene_read_target(morph_scene_reader *r, const morph_value *root) {
@@ -197,7 +201,7 @@ void morph_scene_read_target(morph_scene_reader *r, const morph_value *root) {
     if (shaped) check_relations(&map, def);
     if (shaped) check_extent(r, &map);
     r->target_known = shaped && r->yaml.faults.count == before && !r->yaml.faults.nomem;
-    read_deformable(&map);
+    read_deformable(&map, def);
 }
 
 /* Moves the mesh, built around the origin, to its place. Without `at` it stands on the base plane (on 0 where

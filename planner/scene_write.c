@@ -96,6 +96,17 @@ static bool put_text(buffer *b, const char *key, const char *text) {
     return true;
 }
 
+static void put_fixed(buffer *b, const morph_structure_def *def) {
+    if (def->fixed != MORPH_FIXED_LIST) {
+        put(b, "  fixed: %s\n", morph_fixed_names[def->fixed]);
+        return;
+    }
+    put(b, "  fixed: [");
+    for (int k = 0; k < def->fixed_nodes; k++)
+        put(b, "%s[%d, %d]", k ? ", " : "", def->fixed_node[k][0], def->fixed_node[k][1]);
+    put(b, "]\n");
+}
+
 static void put_structure(buffer *b, const morph_structure_def *def) {
     put(b, "structure:\n");
     put(b, "  layout: %s\n", morph_layout_names[def->layout]);
@@ -105,7 +116,7 @@ static void put_structure(buffer *b, const morph_structure_def *def) {
     put(b, "  joints: %s\n", morph_joint_type_names[def->joints]);
     put(b, "  bracing: %s\n", morph_bracing_names[def->bracing]);
     put_number(b, "  mass", def->mass);
-    put(b, "  fixed: none\n");
+    put_fixed(b, def);
     put(b, "  support: %s\n", morph_support_names[def->support]);
     put(b, "  link:\n    length:\n");
     put_numbers(b, "      bottom", def->length[MORPH_LINK_BOTTOM], 2, false);
@@ -158,17 +169,49 @@ static bool put_target(buffer *b, const morph_target_def *def, const char *file)
         put_number(b, "  scale", def->scale);
     put_numbers(b, "  rotate", def->rotate, 3, true);
     put_numbers(b, "  at", def->at, 3, false);
+    if (def->has_deformable) {
+        put(b, "  deformable:\n");
+        put_number(b, "    young", def->young);
+        put_number(b, "    density", def->density);
+    }
     return good;
 }
 
-static void put_motion(buffer *b, const morph_motion_def *motion) {
+static void put_touch(buffer *b, const morph_scene *scene) {
+    put(b, scene->touches > 0 ? "  touch:\n" : "  touch: []\n");
+    for (int k = 0; k < scene->touches; k++) {
+        const morph_scene_touch *t = &scene->touch[k];
+        int layer, node[2];
+        morph_joint_place(&scene->structure, t->joint, &layer, node);
+        put(b, "    - node: [%d, %d]\n", node[0], node[1]);
+        put(b, "      layer: %s\n", layer ? "top" : "bottom");
+        put_numbers(b, "      force", t->force, 3, false);
+        put_number(b, "      from", t->from);
+        put_number(b, "      to", t->to);
+    }
+}
+
+static void put_attractors(buffer *b, const morph_scene *scene) {
+    if (scene->attractors != MORPH_ATTRACT_LIST) {
+        put(b, "attractors: %s\n", scene->attractors == MORPH_ATTRACT_NONE ? "none" : "auto");
+        return;
+    }
+    put(b, "attractors:\n");
+    for (int k = 0; k < scene->centres; k++) {
+        put_numbers(b, "  - at", scene->centre[k].at, 3, false);
+        put_number(b, "    strength", scene->centre[k].strength);
+    }
+}
+
+static void put_motion(buffer *b, const morph_scene *scene) {
+    const morph_motion_def *motion = &scene->motion;
     put(b, "motion:\n  mode: %s\n", morph_mode_names[motion->mode]);
     put_number(b, "  height", motion->height);
     put_number(b, "  gravity", motion->gravity);
     put_number(b, "  drag", motion->drag);
     put_number(b, "  friction", motion->friction);
     put_number(b, "  time", motion->time);
-    put(b, "  touch: []\n");
+    put_touch(b, scene);
 }
 
 static bool put_scene(buffer *b, const morph_scene *scene, const char *mesh_file) {
@@ -180,8 +223,8 @@ static bool put_scene(buffer *b, const morph_scene *scene, const char *mesh_file
         put(b, "base: none\n");
     else
         put_number(b, "base", scene->base);
-    put_motion(b, &scene->motion);
-    put(b, "attractors: %s\n", scene->attractors == MORPH_ATTRACT_NONE ? "none" : "auto");
+    put_motion(b, scene);
+    put_attractors(b, scene);
     put(b, "start: flat\n");
     put(b, "schedule:\n");
     if (scene->duration > 0.0)

@@ -89,18 +89,54 @@ static double in_degrees(double radians) {
     return radians * 180.0 / M_PI;
 }
 
+/* Layout, joints, bracing, and what is held. */
+static void structure_lines(FILE *out, const morph_structure *s) {
+    const morph_structure_def *d = &s->def;
+    static const char *const bracing[3] = {"no bracing", "web bracing", "full bracing"};
+    int kind[3] = {0, 0, 0};
+    for (int l = 0; l < s->links; l++)
+        kind[s->link_kind[l]]++;
+    fprintf(out, "structure  %d x %d nodes, spacing %.4g m: %d joints, %d links, %d posts\n", s->nx, s->ny,
+            s->spacing, s->joints, s->links, s->posts);
+    if (d->layout == MORPH_LAYOUT_OFFSET)
+        fprintf(out, "           offset double layer (bottom %d x %d), %.4g m high", s->layer_nodes[0][0],
+                s->layer_nodes[0][1], d->thickness);
+    else
+        fprintf(out, "           posts %.4g m long, %s joints, %s", d->thickness,
+                d->joints == MORPH_JOINTS_UNIVERSAL ? "universal" : "ball", bracing[d->bracing]);
+    fprintf(out, "; links: %d bottom, %d top, %d braces\n", kind[MORPH_LINK_BOTTOM], kind[MORPH_LINK_TOP],
+            kind[MORPH_LINK_BRACE]);
+    if (s->panels > 0) fprintf(out, "           %d side panels stay plane\n", s->panels);
+    if (s->fixed_count > 0)
+        fprintf(out, "           %d %s held where they start\n", s->fixed_count,
+                s->posts > 0 ? "posts" : "joints of the top layer");
+}
+
 static void limit_lines(FILE *out, const morph_structure *s) {
     const morph_structure_def *d = &s->def;
-    fprintf(out, "limits     %d lengths from %.4g to %.4g m (bottom), %.4g to %.4g m (top)\n", s->links,
+    fprintf(out, "limits     %d lengths from %.4g to %.4g m (bottom), %.4g to %.4g m (top)", s->links,
             d->length[MORPH_LINK_BOTTOM][0], d->length[MORPH_LINK_BOTTOM][1], d->length[MORPH_LINK_TOP][0],
             d->length[MORPH_LINK_TOP][1]);
-    fprintf(out, "           rate %.4g m/s, acceleration %.4g m/s2, jerk %.4g m/s3 of every length\n",
+    if (d->layout == MORPH_LAYOUT_OFFSET || d->bracing != MORPH_BRACING_NONE)
+        fprintf(out, ", %.4g to %.4g times their start (braces)", d->length[MORPH_LINK_BRACE][0],
+                d->length[MORPH_LINK_BRACE][1]);
+    fprintf(out, "\n           rate %.4g m/s, acceleration %.4g m/s2, jerk %.4g m/s3 of every length\n",
             d->rate, d->acceleration, d->jerk);
-    fprintf(out,
-            "           %d angles of link and post from %.4g to %.4g degrees, %d of neighbouring links from "
-            "%.4g to %.4g\n",
-            s->link_posts, in_degrees(d->link_post[0]), in_degrees(d->link_post[1]), s->link_links,
+    if (s->link_posts > 0)
+        fprintf(out, "           %d angles of link and post from %.4g to %.4g degrees\n", s->link_posts,
+                in_degrees(d->link_post[0]), in_degrees(d->link_post[1]));
+    fprintf(out, "           %d angles of neighbouring links from %.4g to %.4g degrees\n", s->link_links,
             in_degrees(d->link_link[0]), in_degrees(d->link_link[1]));
+}
+
+static void mobility_lines(FILE *out, const morph_structure *s, const morph_mobility *m) {
+    fprintf(out,
+            "mobility   flat: %d free motions, %d redundant rows (rank %d of %d rows: links%s%s), least "
+            "singular value %.4g\n",
+            m->free, m->redundant, m->rank, m->rows, s->posts > 0 ? ", posts" : "",
+            s->panels > 0 ? ", panels" : "", m->sigma_min);
+    if (m->rigid < 6)
+        fprintf(out, "           %d of the 6 rigid motions are left by what is held\n", m->rigid);
 }
 
 static void target_lines(FILE *out, const morph_mesh_report *t) {
@@ -120,14 +156,9 @@ char *morph_info_text(const morph_scene *scene, const morph_structure *s, const 
     FILE *out = open_memstream(&text, &size);
     if (!out) return NULL;
     fprintf(out, "scene      %s\n", scene->title && scene->title[0] ? scene->title : scene->file);
-    fprintf(out, "structure  %d x %d nodes, spacing %.4g m: %d joints, %d links, %d posts\n", s->nx, s->ny,
-            s->spacing, s->joints, s->links, s->posts);
+    structure_lines(out, s);
     limit_lines(out, s);
-    fprintf(
-        out,
-        "mobility   flat: %d free motions, %d redundant lengths (rank %d of %d rows: links and posts), least "
-        "singular value %.4g\n",
-        m->free, m->redundant, m->rank, m->rows, m->sigma_min);
+    mobility_lines(out, s, m);
     target_lines(out, &scene->target_report);
     fprintf(out, "size       %d unknowns for a pose\nlinks      number, nodes (i,j) at both ends, layer\n",
             3 * s->joints);

@@ -109,26 +109,41 @@ later '--level fine' plan "$scene" --level fine
 later '--threads' plan "$scene" --threads 2
 
 # with SECTION KEY VALUE: the scene with a key more; SECTION "" is the top.
-later_key() {
+with_key() {
     if [ -n "$1" ]; then
         sed "s|^\( *\)$1:\$|&\n\1  $2: $3|" "$scene" >"$work/later.yaml"
     else
         { cat "$scene" && echo && echo "$2: $3"; } >"$work/later.yaml"
     fi
+}
+later_key() {
+    with_key "$@"
     later "$2" plan "$work/later.yaml"
     says "later.yaml:[0-9]*: "
 }
-later_key structure layout offset
-later_key structure joints universal
-later_key structure bracing web
-later_key structure fixed border
-later_key structure fixed '[[0, 0], [3, 3]]'
-later_key structure support frame
+# Read and shown, but not planned by the refining method yet.
+beyond_key() {
+    with_key "$@"
+    expect 0 "$program" info "$work/later.yaml"
+    later "$1.$2" plan "$work/later.yaml"
+    says 'later.yaml: .* with --method ipopt'
+}
+read_key() {
+    with_key "$@"
+    expect 0 "$program" info "$work/later.yaml"
+}
+beyond_key structure layout offset
+beyond_key structure joints universal
+beyond_key structure bracing web
+beyond_key structure fixed border
+beyond_key structure fixed '[[0, 0], [3, 3]]'
+beyond_key motion mode rise
+with_key target deformable '{young: 2.0e4, density: 300}'
+later target.deformable plan "$work/later.yaml"
+read_key structure support frame
+read_key motion touch '[{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}]'
+read_key '' attractors '[{at: [0, 0, 0], strength: 1.0}]'
 later_key link force '[-50, 50]'
 later_key link stuck '[3, 4]'
-later_key target deformable '{young: 2.0e4, density: 300}'
-later_key motion mode rise
-later_key motion touch '[{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}]'
-later_key '' attractors '[{at: [0, 0, 0], strength: 1.0}]'
 later_key '' start other.plan
 later_key '' goal '{mean_gap: 0.01}'

@@ -1,56 +1,5 @@
-/* Bad scenes: the exact line, the key, and what is said; all faults at once; hostile files. */
-#include "planner/scene_parts.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
-typedef struct log_lines {
-    char text[200][1024];
-    int count;
-} log_lines;
-
-static void keep(void *user, const char *line) {
-    log_lines *log = user;
-    if (log->count < 200) snprintf(log->text[log->count], sizeof log->text[0], "%s", line);
-    log->count++;
-}
-
-static void ignore(void *user, const char *line) {
-    (void)user;
-    (void)line;
-}
-
-static log_lines faults;
-
-/* Parses bad text; the lines are in faults. */
-static void parse_bad(const char *text, size_t size) {
-    morph_scene *scene = NULL;
-    faults.count = 0;
-    const morph_status status = morph_scene_parse("s.yaml", text, size, keep, ignore, &faults, &scene);
-    if (status != MORPH_ERR_INPUT) fail_msg("status %d for:\n%.600s", (int)status, text);
-    assert_null(scene);
-    assert_true(faults.count > 0);
-    for (int k = 0; k < faults.count && k < 200; k++)
-        assert_null(strchr(faults.text[k], '\n'));
-}
-
-/* A fault "s.yaml:LINE: KEY: ...phrase...". */
-static void expect(int line, const char *key, const char *phrase) {
-    char start[256];
-    snprintf(start, sizeof start, "s.yaml:%d: %s: ", line, key);
-    for (int k = 0; k < faults.count && k < 200; k++)
-        if (strncmp(faults.text[k], start, strlen(start)) == 0 && strstr(faults.text[k], phrase)) return;
-    for (int k = 0; k < faults.count && k < 200; k++)
-        print_message("  %s\n", faults.text[k]);
-    fail_msg("no fault \"%s\" with \"%s\"", start, phrase);
-}
+/* Bad scenes: the exact line, the key, and what is said; all faults at once. */
+#include "tests/planner/test_scene_fault_fixture.h"
 
 /* Every case is the scene below with one line replaced (line 0: the text stands as it is). */
 static const char *const lines[] = {
@@ -166,6 +115,20 @@ static const bad_case cases[] = {
     {5, "  spacing: 0.1\n  fixed: [[0, 0], [4, 0]]", 6, "structure.fixed[1][0]",
      "4 is too large, allowed: a whole number"},
     {5, "  spacing: 0.1\n  fixed: [3]", 6, "structure.fixed[0]", "3, allowed: a list of 2"},
+    {5, "  spacing: 0.1\n  fixed: {node: [1, 1]}", 6, "structure.fixed", "a mapping is not known"},
+    {5, "  spacing: 0.1\n  fixed: [[0, 5]]", 6, "structure.fixed[0][1]",
+     "5 is too large, allowed: a whole number from 0 to 4"},
+    {5, "  spacing: 0.1\n  fixed: [[-1, 0]]", 6, "structure.fixed[0][0]", "-1 is too small"},
+    {5, "  spacing: 0.1\n  fixed: [[0.5, 0]]", 6, "structure.fixed[0][0]", "0.5 is no whole number"},
+    {5, "  spacing: 0.1\n  fixed:\n    - [3, 4]\n    - [0, 0]\n    - [3, 4]", 9, "structure.fixed[2]",
+     "[3, 4] is given twice, first in line 7, allowed: once"},
+    {5, "  spacing: 0.1\n  bracing: cross", 6, "structure.bracing", "allowed: none, web, full"},
+    {5, "  spacing: 0.1\n  support: table", 6, "structure.support", "allowed: base, frame, target"},
+    {5, "  spacing: 0.1\n  layout: offset\n  joints: universal", 7, "structure.joints",
+     "universal joints have their axes along posts, allowed with layout offset: ball"},
+    {5, "  spacing: 0.1\n  layout: offset\n  bracing: web", 7, "structure.bracing",
+     "web braces panels between posts, allowed with layout offset (braced by itself): none"},
+    {4, "  nodes: [2, 5]\n  layout: offset", 4, "structure.nodes", "without a cell, allowed: at least 3"},
     /* links */
     {7, "    radius: -1", 7, "structure.link.radius", "-1 is negative"},
     {7, "    radius: 0.03", 7, "structure.link.radius", "links of radius 0.03 touch"},
@@ -195,6 +158,9 @@ static const bad_case cases[] = {
     {7, "    stuck: 3", 7, "structure.link.stuck", "3, allowed: a list of link numbers"},
     {7, "    stuck: [0, 62]", 7, "structure.link.stuck[1]",
      "62 is too large, allowed: a whole number from 0 to 61"},
+    {7, "    stuck: [62]\n  bracing: web", 7, "structure.link.stuck",
+     "not available yet: structure.link.stuck: "},
+    {7, "    stuck: [93]\n  bracing: web", 7, "structure.link.stuck[0]", "a whole number from 0 to 92"},
     {7, "    stuck: [-1]", 7, "structure.link.stuck[0]", "-1 is too small"},
     /* angles */
     {9, "    link_post: [55, 180.5]", 9, "structure.angle.link_post[1]",
@@ -230,7 +196,14 @@ static const bad_case cases[] = {
     {12, "  size: [1, 1, 1]\n  at: [0, 0, inf]", 13, "target.at[2]", "inf is not finite"},
     {12, "  size: [1, 1, 1]\n  at: [0, 0, -1]", 13, "target.at", "below the base"},
     {12, "  size: [1, 1, 1]\n  deformable: 5", 13, "target.deformable", "5 is no mapping"},
-    {12, "  size: [1, 1, 1]\n  deformable: {young: -1}", 13, "target.deformable.young", "-1 is negative"},
+    {12, "  size: [1, 1, 1]\n  deformable: {young: -1, density: 300}", 13, "target.deformable.young",
+     "-1 is negative, allowed: a number above 0 and at most 1e+15 Pa"},
+    {12, "  size: [1, 1, 1]\n  deformable: {young: 1, density: 0}", 13, "target.deformable.density",
+     "0 is too small"},
+    {12, "  size: [1, 1, 1]\n  deformable:\n    young: 1", 13, "target.deformable.density",
+     "is missing, allowed: a number above 0"},
+    {12, "  size: [1, 1, 1]\n  deformable: {young: 1, density: .nan}", 13, "target.deformable.density",
+     "not finite"},
     /* base, motion */
     {13, "base: floor", 13, "base", "floor is no number"},
     {13, "base: nan", 13, "base", "nan is not finite"},
@@ -252,6 +225,21 @@ static const bad_case cases[] = {
      "motion.touch[0].layer", "did you mean top?"},
     {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 1, to: 1}", 16,
      "motion.touch[0].to", "1 is not after from"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 2, to: 1.5}", 16,
+     "motion.touch[0].to", "1.5 is not after from, allowed: more than 2 s"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: -1, to: 1}", 16,
+     "motion.touch[0].from", "-1 is negative"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, nan], from: 0, to: 1}", 16,
+     "motion.touch[0].force[2]", "nan is not finite"},
+    {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 1], from: 0, to: 1}", 16,
+     "motion.touch[0].force", "a list of 2, allowed: a list of 3"},
+    {15, "  touch:\n    - {node: [1, 0], force: [0, 0, 1], from: 0, to: 1}", 16, "motion.touch[0].layer",
+     "is missing, allowed: bottom, top"},
+    {15,
+     "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 0, to: 1}\n"
+     "    - {layer: top, force: [0, 0, 1], from: 0, to: 1}",
+     17, "motion.touch[1].node", "is missing"},
+    {15, "  mode: rise\n  height: 0", 16, "motion.height", "0 lets the target rise by nothing"},
     {15, "  touch:\n    - {node: [1, 0], layer: top, from: 0, to: 1}", 16, "motion.touch[0].force",
      "is missing"},
     {15, "  touch:\n    - {node: [1, 0], layer: top, force: [0, 0, 1], from: 0, to: 1, forse: 1}", 16,
@@ -261,6 +249,12 @@ static const bad_case cases[] = {
     {16, "attractors:\n  - {at: [0, 0], strength: 1}", 17, "attractors[0].at",
      "a list of 2, allowed: a list of 3"},
     {16, "attractors:\n  - {at: [0, 0, 0], strength: -1}", 17, "attractors[0].strength", "-1 is negative"},
+    {16, "attractors:\n  - {at: [0, 0, 0], strength: inf}", 17, "attractors[0].strength", "not finite"},
+    {16, "attractors:\n  - {at: [0, 0, 0], strength: 1}\n  - {strength: 1}", 18, "attractors[1].at",
+     "is missing, allowed: a list of 3 numbers"},
+    {16, "attractors:\n  - {at: [0, 0, 0], strength: 1, power: 2}", 17, "attractors[0].power",
+     "unknown key, allowed: at, strength"},
+    {16, "attractors: {at: [0, 0, 0], strength: 1}", 16, "attractors", "a mapping is not known"},
     {16, "attractors:\n  - {at: [0, 0, 0]}", 17, "attractors[0].strength", "is missing"},
     {17, "start: [1]", 17, "start", "a list of 1 is no text"},
     {18, "goal:\n  coverage: 1.1", 19, "goal.coverage", "1.1 is too large"},
@@ -274,31 +268,8 @@ static const bad_case cases[] = {
     {20, "  sample: 0", 20, "schedule.sample", "0 is too small"},
     {20, "  samples: 1", 20, "schedule.samples", "did you mean sample?"},
     /* understood, but of a later version */
-    {5, "  spacing: 0.1\n  layout: offset", 6, "structure.layout",
-     "not available yet: structure.layout: offset"},
-    {5, "  spacing: 0.1\n  joints: universal", 6, "structure.joints",
-     "not available yet: structure.joints: universal"},
-    {5, "  spacing: 0.1\n  bracing: web", 6, "structure.bracing",
-     "not available yet: structure.bracing: web"},
-    {5, "  spacing: 0.1\n  bracing: full", 6, "structure.bracing",
-     "not available yet: structure.bracing: full"},
-    {5, "  spacing: 0.1\n  fixed: border", 6, "structure.fixed",
-     "not available yet: structure.fixed: border"},
-    {5, "  spacing: 0.1\n  fixed: [[0, 0], [3, 4]]", 6, "structure.fixed",
-     "not available yet: structure.fixed: "},
-    {5, "  spacing: 0.1\n  support: frame", 6, "structure.support",
-     "not available yet: structure.support: frame"},
-    {5, "  spacing: 0.1\n  support: target", 6, "structure.support",
-     "not available yet: structure.support: target"},
     {7, "    force: [-50, 50]", 7, "structure.link.force", "not available yet: structure.link.force: "},
     {7, "    stuck: [0, 61]", 7, "structure.link.stuck", "not available yet: structure.link.stuck: "},
-    {12, "  size: [1, 1, 1]\n  deformable: {young: 2.0e4, density: 300}", 13, "target.deformable",
-     "not available yet: target.deformable: "},
-    {15, "  mode: rise", 15, "motion.mode", "not available yet: motion.mode: rise"},
-    {15, "  touch:\n    - {node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}", 15,
-     "motion.touch", "not available yet: motion.touch: "},
-    {16, "attractors:\n  - {at: [0, 0, 0], strength: 1}", 16, "attractors",
-     "not available yet: attractors: "},
     {17, "start: other.plan", 17, "start", "not available yet: start: other.plan"},
     {18, "goal:\n  coverage: 0.9", 18, "goal", "not available yet: goal: "},
 };
@@ -319,6 +290,37 @@ static void test_cases(void **state) {
         }
     }
     print_message("%zu bad scenes\n", sizeof cases / sizeof *cases);
+}
+
+/* Nodes of the smaller layer of an offset grid; a layout that is not known bounds them by the larger. */
+static void test_layer_nodes(void **state) {
+    (void)state;
+    static const struct {
+        const char *layout, *touch;
+        const char *phrase; /* NULL: good */
+    } cases[] = {
+        {"posts", "node: [3, 4], layer: bottom", NULL},
+        {"offset", "node: [3, 4], layer: top", NULL},
+        {"offset", "node: [2, 3], layer: bottom", NULL},
+        {"offset", "node: [3, 3], layer: bottom", "[0]: 3 is too large, allowed: a whole number from 0 to 2"},
+        {"offset", "node: [2, 4], layer: bottom", "[1]: 4 is too large, allowed: a whole number from 0 to 3"},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char text[600];
+        snprintf(text, sizeof text,
+                 "morphplan: 1\nstructure: {nodes: [4, 5], spacing: 0.1, layout: %s}\n"
+                 "target: {shape: box, size: [0.1, 0.1, 0.1]}\n"
+                 "motion:\n  touch:\n    - {%s, force: [0, 0, 1], from: 0, to: 1}\n",
+                 cases[k].layout, cases[k].touch);
+        morph_scene *scene;
+        faults.count = 0;
+        const morph_status status =
+            morph_scene_parse("s.yaml", text, strlen(text), keep, ignore, &faults, &scene);
+        assert_int_equal(status, cases[k].phrase ? MORPH_ERR_INPUT : MORPH_OK);
+        assert_int_equal(faults.count, cases[k].phrase ? 1 : 0);
+        if (cases[k].phrase) assert_non_null(strstr(faults.text[0], cases[k].phrase));
+        morph_scene_destroy(scene);
+    }
 }
 
 /* The unchanged scene is good: the cases fail for their own line only. */
@@ -352,14 +354,13 @@ static void test_all_at_once(void **state) {
         "  sample: -1\n"
         "extra: 1\n";
     parse_bad(text, strlen(text));
-    assert_int_equal(faults.count, 10);
+    assert_int_equal(faults.count, 9);
     expect(1, "morphplan", "3");
     expect(3, "structure.nodes[0]", "1");
     expect(4, "structure.spacing", "x");
     expect(5, "structure.link.radius", "-1");
     expect(5, "structure.link.jerk", "nan");
     expect(8, "target.file", "");
-    expect(10, "motion.mode", "not available yet");
     expect(10, "motion.drag", "-1");
     expect(12, "schedule.sample", "-1");
     expect(13, "extra", "unknown key");
@@ -373,17 +374,6 @@ static void test_all_at_once(void **state) {
     morph_scene *scene;
     assert_int_equal(morph_scene_parse("s.yaml", text, strlen(text), NULL, NULL, NULL, &scene),
                      MORPH_ERR_INPUT);
-}
-
-static char *repeated(const char *piece, size_t bytes, size_t *size) {
-    const size_t n = strlen(piece), times = bytes / n;
-    char *text = malloc(n * times + 1);
-    assert_non_null(text);
-    for (size_t k = 0; k < times; k++)
-        memcpy(text + k * n, piece, n);
-    text[n * times] = '\0';
-    *size = n * times;
-    return text;
 }
 
 /* Sections that are no mapping or empty; required ones missing altogether. */
@@ -458,129 +448,10 @@ static void test_shapes(void **state) {
     }
 }
 
-/* What is no scene at all. */
-static void test_syntax(void **state) {
-    (void)state;
-    static const struct {
-        const char *text;
-        int line;
-        const char *phrase;
-    } bad[] = {
-        {"", 1, "the file is empty"},
-        {"# only a comment\n", 1, "the file is empty"},
-        {"---\n...\n", 2, "nothing, allowed: a mapping"},
-        {"hello\n", 1, "hello, allowed: a mapping"},
-        {"- 1\n- 2\n", 1, "a list of 2, allowed: a mapping"},
-        {"morphplan: 1\nstructure: [4\ntarget: x\n", 3, "not YAML"},
-        {"morphplan: 1\n  structure: 2\n", 2, "not YAML"},
-        {"morphplan: 1\nstructure:\n\tnodes: 1\n", 3, "not YAML"},
-        {"morphplan: \"1\n", 2, "not YAML"},
-        {"a: 1\n---\nb: 2\n", 2, "a second document"},
-        {"a: &x 1\nb: *x\n", 1, "&x: anchors and aliases"},
-        {"a: &x 1\nb: *x\n", 2, "*x: anchors and aliases"},
-        {"a: 1\nb: !!float 2\n", 2, "tags are not used"},
-        {"a: \"x\\0y\"\n", 1, "zero byte"},
-        {"a: 1\nb: \xff\n", 2, "byte 0xff is not UTF-8"},
-        {"a: 1\nb: \xc0\xaf\n", 2, "byte 0xc0 is not UTF-8"},
-        {"a: 1\r\nb: 2\r\nc: \xed\xa0\x80\r\n", 3, "byte 0xed is not UTF-8"},
-        {"a: 1\nb: \xe2\x82", 2, "byte 0xe2 is not UTF-8"},
-        {"a: 1\nb: \x01\n", 2, "control character 0x01"},
-        {"\xff\xfe"
-         "a",
-         1, "not UTF-8"},
-        {"\x7f"
-         "ELF",
-         1, "control character"},
-        {"%YAML 3.0\n---\na: 1\n", 1, "not YAML"},
-        {"a: [[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]\n", 1, "nested deeper than 16"},
-    };
-    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
-        parse_bad(bad[k].text, strlen(bad[k].text));
-        expect(bad[k].line, "scene", bad[k].phrase);
-    }
-    /* Within a megabyte, but far more values than any scene has. */
-    size_t size;
-    char *many = repeated("- 1\n", 400000, &size);
-    parse_bad(many, size);
-    expect(MORPH_YAML_NODES, "scene", "more than 50000 values");
-    assert_int_equal(faults.count, 1);
-    free(many);
-    parse_bad("a: 1\0b", 6);
-    expect(1, "scene", "control character 0x00");
-    /* A byte order mark is fine. */
-    static const char marked[] =
-        "\xef\xbb\xbfmorphplan: 1\nstructure: {nodes: [4, 4], spacing: 0.1}\n"
-        "target: {shape: box, size: [0.1, 0.1, 0.1]}\n";
-    morph_scene *scene;
-    assert_int_equal(morph_scene_parse("s.yaml", marked, strlen(marked), NULL, NULL, NULL, &scene), MORPH_OK);
-    morph_scene_destroy(scene);
-}
-
-/* A megabyte of anything is answered quickly: each within a second. */
-static void test_hostile(void **state) {
-    (void)state;
-    static const char *const pieces[] = {
-        "[",      "{",     "- ",     "? ",    "a: ",    "a:\n", "- a\n", "{a: ", "[a, ",
-        "\"a\" ", "x",     "\n",     "#\n",   "a: {\n", "&a ",  "*a ",   "!t ",  "'",
-        "\"\\x",  "|\n ",  "%a\n",   "---\n", ": ",     ",",    "]",     "\t",   "\xf0\x9f\x98\x80",
-        "[],",    "a,b: ", "- - -\n"};
-    for (size_t k = 0; k < sizeof pieces / sizeof *pieces; k++) {
-        size_t size;
-        char *text = repeated(pieces[k], (size_t)MORPH_YAML_BYTES, &size);
-        const double start = morph_seconds();
-        parse_bad(text, size);
-        const double seconds = morph_seconds() - start;
-        if (seconds > 0.2) print_message("%.2f s for a megabyte of \"%s\"\n", seconds, pieces[k]);
-        assert_true(seconds < 20.0); /* a loaded machine and sanitizers: what it must not be is quadratic */
-        free(text);
-    }
-    size_t size;
-    char *text = repeated("# just too much\n", (size_t)MORPH_YAML_BYTES + 32, &size);
-    parse_bad(text, size);
-    expect(1, "scene", "larger than 1 MiB");
-    free(text);
-}
-
-/* Thousands of faults end in a count. */
-static void test_many_faults(void **state) {
-    (void)state;
-    char *text = malloc(200000);
-    assert_non_null(text);
-    size_t used = (size_t)snprintf(text, 200000, "morphplan: 1\nmotion:\n  touch:\n");
-    for (int k = 0; k < 3000; k++)
-        used += (size_t)snprintf(text + used, 200000 - used, "    - {a%d: 1}\n", k);
-    parse_bad(text, used);
-    assert_int_equal(faults.count, MORPH_YAML_FAULTS);
-    free(text);
-}
-
-static void test_missing_files(void **state) {
-    (void)state;
-    morph_scene *scene;
-    faults.count = 0;
-    assert_int_equal(morph_scene_read("/no/such/scene.yaml", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
-    assert_null(scene);
-    assert_int_equal(faults.count, 1);
-    assert_non_null(strstr(faults.text[0], "/no/such/scene.yaml:1: scene: cannot be read: No such file"));
-    /* One line, whatever the name. */
-    faults.count = 0;
-    assert_int_equal(morph_scene_read("no\nsuch\tscene", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
-    assert_int_equal(strncmp(faults.text[0], "no?such?scene:1: scene: cannot be read", 38), 0);
-    faults.count = 0;
-    assert_int_equal(morph_scene_read("/tmp", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
-    assert_int_equal(faults.count, 1);
-    assert_int_equal(morph_scene_read("/dev/null", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
-    assert_int_equal(morph_scene_read("/dev/zero", keep, ignore, &faults, &scene), MORPH_ERR_INPUT);
-    assert_non_null(strstr(faults.text[2], "larger than 1 MiB"));
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_control),       cmocka_unit_test(test_cases),
-        cmocka_unit_test(test_sections),      cmocka_unit_test(test_shapes),
-        cmocka_unit_test(test_all_at_once),   cmocka_unit_test(test_syntax),
-        cmocka_unit_test(test_hostile),       cmocka_unit_test(test_many_faults),
-        cmocka_unit_test(test_missing_files),
+        cmocka_unit_test(test_control),  cmocka_unit_test(test_cases),  cmocka_unit_test(test_layer_nodes),
+        cmocka_unit_test(test_sections), cmocka_unit_test(test_shapes), cmocka_unit_test(test_all_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

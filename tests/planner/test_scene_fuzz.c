@@ -47,8 +47,11 @@ static const char good_text[] =
     "# and numbers whose digits may be others.\n"
     "morphplan: 1\n"
     "title: 'Every letter of this may be another one'\n"
-    "structure: {nodes: [4, 4], spacing: 0.1}\n"
+    "structure: {nodes: [4, 4], spacing: 0.1, bracing: web, fixed: [[0, 0], [3, 3], [1, 2]]}\n"
     "target: {shape: box, size: [0.15, 0.15, 0.1]}\n"
+    "motion:\n"
+    "  touch: [{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}]\n"
+    "attractors: [{at: [0, 0, 0.25], strength: 1.5}, {at: [0, 1, 0], strength: 2}]\n"
     "schedule: {duration: auto}\n";
 
 static uint64_t seed = 20240229;
@@ -124,6 +127,11 @@ static void try_text(const char *text, size_t size, int *scenes) {
     assert_int_equal(
         morph_scene_parse("fuzz.yaml", written, strlen(written), count_line, ignore, &lines, &copy),
         MORPH_OK);
+    const int fixed = scene->structure.fixed_nodes;
+    assert_int_equal(copy->structure.fixed_nodes, fixed);
+    if (fixed > 0) assert_memory_equal(scene->fixed_node, copy->fixed_node, (size_t)fixed * sizeof(int[2]));
+    /* All but where the list of nodes stands. */
+    scene->structure.fixed_node = copy->structure.fixed_node = NULL;
     assert_memory_equal(&scene->structure, &copy->structure, sizeof scene->structure);
     morph_scene_destroy(copy);
     morph_scene_destroy(scene);

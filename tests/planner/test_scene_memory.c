@@ -68,8 +68,10 @@ SHOWN void free(void *memory) {
 }
 
 static const char good[] =
-    "morphplan: 1\ntitle: x\nstructure: {nodes: [4, 4], spacing: 0.1}\n"
-    "target: {shape: box, size: [0.15, 0.15, 0.1], at: [0, 3, 0.1]}\n";
+    "morphplan: 1\ntitle: x\nstructure: {nodes: [4, 4], spacing: 0.1, fixed: [[0, 0], [3, 1]]}\n"
+    "target: {shape: box, size: [0.15, 0.15, 0.1], at: [0, 3, 0.1]}\n"
+    "motion: {touch: [{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}]}\n"
+    "attractors: [{at: [0, 0, 0.25], strength: 1.5}]\n";
 static const char bad[] =
     "morphplan: 1\nstructure: {nodes: [4, 4], spacing: 0.1, thikness: 1}\nstart: x\n"
     "target: {shape: mesh, file: missing.obj, fit: [0.1, 0.1, -0.1]}\nbase: [1]\n";

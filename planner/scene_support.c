@@ -1,0 +1,36 @@
+/* Which scenes a method can plan. */
+#include "planner/scene_parts.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* "KEY: VALUE" of the first feature that the refined plan does not know, in the scene file's order; false if
+ * there is none. */
+static bool beyond_refinement(const morph_scene *scene, char *text, size_t size) {
+    const morph_structure_def *def = &scene->structure;
+    if (def->layout != MORPH_LAYOUT_POSTS)
+        snprintf(text, size, "structure.layout: %s", morph_layout_names[def->layout]);
+    else if (def->joints != MORPH_JOINTS_BALL)
+        snprintf(text, size, "structure.joints: %s", morph_joint_type_names[def->joints]);
+    else if (def->bracing != MORPH_BRACING_NONE)
+        snprintf(text, size, "structure.bracing: %s", morph_bracing_names[def->bracing]);
+    else if (def->fixed == MORPH_FIXED_LIST)
+        snprintf(text, size, "structure.fixed: a list of nodes");
+    else if (def->fixed != MORPH_FIXED_NONE)
+        snprintf(text, size, "structure.fixed: %s", morph_fixed_names[def->fixed]);
+    else if (scene->target_def.has_deformable)
+        snprintf(text, size, "target.deformable");
+    else if (scene->motion.mode != MORPH_MODE_DROP)
+        snprintf(text, size, "motion.mode: %s", morph_mode_names[scene->motion.mode]);
+    else
+        return false;
+    return true;
+}
+
+bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size) {
+    char feature[96];
+    if (size > 0) text[0] = '\0';
+    if (strcmp(method, "blanket") == 0 || !beyond_refinement(scene, feature, sizeof feature)) return true;
+    snprintf(text, size, "not available yet: %s with --method %s", feature, method);
+    return false;
+}
