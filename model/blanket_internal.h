@@ -53,11 +53,12 @@ typedef struct morph_angle {
 #define MORPH_BLANKET_SWEEPS 12
 
 /* What counts as held: lengths a tenth of a millionth part of what a link moves through, clearance what a
- * plan's clearance is checked to (spacings); panels what a plan's are checked to (sine). Posts come out exact
- * to rounding. */
+ * plan's clearance is checked to (spacings); panels what a plan's are checked to (sine), posts
+ * a thousandth of what a plan's are (relative). */
 #define MORPH_BLANKET_LENGTH_HELD 1e-9
 #define MORPH_BLANKET_CLEARANCE_HELD 1e-3
 #define MORPH_BLANKET_PANEL_HELD 1e-6
+#define MORPH_BLANKET_POST_HELD 1e-9
 
 /* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
 typedef struct morph_memo {
@@ -74,6 +75,8 @@ typedef struct morph_violation {
     double panel;     /* sine */
     int link, tuple;  /* where length and angle are worst */
 } morph_violation;
+
+typedef struct morph_blanket_fix morph_blanket_fix;
 
 typedef struct morph_blanket_state {
     const morph_structure *structure;
@@ -103,7 +106,9 @@ typedef struct morph_blanket_state {
     int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
     int near_links, near_angles;
     morph_angle *angle;
-    morph_memo *memo; /* links, then skin triangles */
+    morph_blanket_fix *fix; /* equalities solved together */
+    double *spare_x;        /* 3*joints */
+    morph_memo *memo;       /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
@@ -149,6 +154,10 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double m
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
 /* One pass over angles, lengths, contacts and posts of x; backward turns the order round. */
 void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
+/* The panel's volume over the size of its gradient, a length, and the gradient of norm 1 by bottom and top of
+ * either post. False where it has no direction. */
+bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
+                             double grad[4][3]);
 double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
 double morph_blanket_cosine(const morph_angle *a, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
@@ -158,6 +167,12 @@ morph_violation morph_blanket_violation(const morph_blanket_state *b, const doub
 /* blanket_polish.c: sweeps until x holds the structure's own limits or stops improving; contact by the exact
  * distance where there is one. Velocities are not touched. Returns what is left. */
 morph_violation morph_blanket_polish(morph_blanket_state *b, double *x);
+
+/* blanket_fix.c: moves x by the least that makes posts rigid, panels plane, prescribed lengths right and
+ * lengths beyond a limit lie inside; what cannot be met is left. */
+morph_status morph_blanket_fix_create(const morph_structure *s, morph_blanket_fix **out);
+void morph_blanket_fix_destroy(morph_blanket_fix *f); /* NULL allowed */
+void morph_blanket_fix_apply(morph_blanket_state *b, double *x);
 
 /* blanket_contact.c */
 morph_status morph_blanket_touches_create(morph_blanket_state *b);

@@ -39,7 +39,7 @@ static morph_violation member_violation(const morph_blanket_state *b, const doub
 static bool held(const morph_blanket_state *b, const morph_violation *v) {
     const double spacing = b->structure->spacing;
     return v->length <= MORPH_BLANKET_LENGTH_HELD * spacing &&
-           v->clearance <= MORPH_BLANKET_CLEARANCE_HELD * spacing && v->post < 1e-12 &&
+           v->clearance <= MORPH_BLANKET_CLEARANCE_HELD * spacing && v->post <= MORPH_BLANKET_POST_HELD &&
            v->panel <= MORPH_BLANKET_PANEL_HELD;
 }
 
@@ -62,6 +62,7 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)
             morph_blanket_sweep(b, x, (sweep & 1) != 0, 0.0);
+        morph_blanket_fix_apply(b, x);
     }
 }
 

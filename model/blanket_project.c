@@ -293,6 +293,20 @@ double morph_blanket_panel_sine(const morph_structure *s, int panel, const doubl
     return scale > 0.0 ? volume / scale : 0.0;
 }
 
+bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
+                             double grad[4][3]) {
+    const double *corner[4];
+    const double volume = panel_volume(s, panel, x, corner, grad);
+    double square = 0.0;
+    for (int k = 0; k < 4; k++)
+        square += morph_dot(grad[k], grad[k]);
+    const double size = sqrt(square);
+    *residual = size > 0.0 ? volume / size : 0.0;
+    for (int k = 0; k < 12 && size > 0.0; k++)
+        grad[k / 3][k % 3] /= size;
+    return size > 0.0;
+}
+
 static void project_panel(const morph_blanket_state *b, int panel, double *x) {
     const morph_structure *s = b->structure;
     const double *corner[4];

@@ -35,7 +35,7 @@ static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
 
 static morph_status allocate(morph_blanket_state *b) {
     const size_t n = 3 * (size_t)b->joints;
-    double **const arrays[] = {&b->x, &b->v, &b->a, &b->before, &b->keep_x, &b->keep_v};
+    double **const arrays[] = {&b->x, &b->v, &b->a, &b->before, &b->keep_x, &b->keep_v, &b->spare_x};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         if (!(*arrays[k] = morph_alloc(n, sizeof(double)))) return MORPH_ERR_NOMEM;
     if (!(b->weight = morph_alloc((size_t)b->joints, sizeof(double)))) return MORPH_ERR_NOMEM;
@@ -43,7 +43,8 @@ static morph_status allocate(morph_blanket_state *b) {
         b->weight[j] = 1.0;
     for (int k = 0; k < b->def.fixed_count; k++)
         b->weight[b->def.fixed[k]] = 0.0;
-    const morph_status status = morph_blanket_limits_create(b);
+    morph_status status = morph_blanket_fix_create(b->structure, &b->fix);
+    if (status == MORPH_OK) status = morph_blanket_limits_create(b);
     return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
 }
 
@@ -83,7 +84,7 @@ morph_status morph_blanket_state_create(const morph_structure *s, const morph_sd
 
 void morph_blanket_state_destroy(morph_blanket_state *b) {
     if (!b) return;
-    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v};
+    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v, b->spare_x};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         free(arrays[k]);
     free(b->weight);
@@ -94,6 +95,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->near_angle);
     free(b->push);
     free(b->angle);
+    morph_blanket_fix_destroy(b->fix);
     free(b->memo);
     free(b->touch);
     free(b->contact);

@@ -1,9 +1,9 @@
 /* Settle's run: implicit steps, Newton's iteration within one, the end. */
 #include "model/settle_internal.h"
 
-#include <string.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Drag of the first step in loads per spacing: free fall then moves a quarter of a spacing. */
 #define FIRST_DRAG 4.0
@@ -178,7 +178,11 @@ static morph_status run(morph_settle *s, const morph_control *control, morph_set
         const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
         if (status != MORPH_OK) return status;
         move = largest_move(s, s->x);
-        if (getenv("TRACE")) fprintf(stderr, "%d it %d res %.2e worst %.2e deep %.2e move %.2e drag %.2e good %d stiff %.1e E %.8f\n", r->steps, s->iterations, r->residual, worst, deep, move, s->drag, good, s->stiff, morph_settle_evaluate(s,s->x,MORPH_SETTLE_VALUE));
+        if (getenv("TRACE"))
+            fprintf(stderr,
+                    "%d it %d res %.2e worst %.2e deep %.2e move %.2e drag %.2e good %d stiff %.1e E %.8f\n",
+                    r->steps, s->iterations, r->residual, worst, deep, move, s->drag, good, s->stiff,
+                    morph_settle_evaluate(s, s->x, MORPH_SETTLE_VALUE));
     }
     return MORPH_OK;
 }
