@@ -12,9 +12,18 @@
 /* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
  * joint moves 0.06 spacings per step; contacts are listed to that distance. */
 #define LONGEST_STEP 0.02
-/* A frame whose energy rose is redone with half the step, at most this often: 16 times shorter than a step
- * asked for; the step of our own choice is stable from the start. */
-#define MOST_HALVINGS 4
+/* A frame whose energy rose without cause is redone with half the step, down to this part of the step that
+ * should be stable: what still rises then is no matter of the step. */
+#define LEAST_STEP (1.0 / 16.0)
+/* Motion in a step that is planned for and that is refused, in spacings: between them a frame may speed up.
+ * What moves further is not safely followed along its way. */
+#define PLANNED_MOVE 0.1
+#define MOST_MOVE 0.25
+/* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
+ * angle): half a degree, what the falling blanket's own frames keep. */
+#define ANGLE_GIVES 0.01
+/* What a target that was held up draws back by in a frame that still breaks a limit, spacings. */
+#define RETREAT 0.02
 
 /* Beyond these a run is not meant: 1e7 steps a frame would take hours. */
 #define MOST_STEPS 1e6
@@ -24,6 +33,7 @@ void morph_trajectory_free(morph_trajectory *t) {
     if (!t) return;
     free(t->time);
     free(t->x);
+    free(t->lift);
     *t = (morph_trajectory){0};
 }
 
@@ -31,28 +41,38 @@ static morph_status trajectory_create(morph_trajectory *t, int capacity, int joi
     *t = (morph_trajectory){.joints = joints};
     t->time = morph_alloc((size_t)capacity, sizeof(double));
     t->x = morph_alloc((size_t)capacity * 3, (size_t)joints * sizeof(double));
-    if (t->time && t->x) return MORPH_OK;
+    t->lift = morph_alloc((size_t)capacity, sizeof(double));
+    if (t->time && t->x && t->lift) return MORPH_OK;
     morph_trajectory_free(t);
     return MORPH_ERR_NOMEM;
 }
 
 /* A frame is the state with its limits polished; the motion itself goes on unpolished. */
-static void record(morph_blanket_state *b, double time, morph_trajectory *t, morph_blanket_report *report) {
+static morph_violation record(morph_blanket_state *b, double time, morph_trajectory *t) {
     double *x = &t->x[(size_t)t->frames * 3 * (size_t)b->joints];
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));
     const morph_violation worst = morph_blanket_polish(b, x);
-    report->worst_length = fmax(report->worst_length, worst.length);
-    report->worst_post = fmax(report->worst_post, worst.post);
-    report->worst_clearance = fmax(report->worst_clearance, worst.clearance);
+    t->lift[t->frames] = b->lift;
     t->time[t->frames++] = time;
+    return worst;
 }
 
-/* Steps through one frame. Nothing but gravity feeds the motion and gravity's work is within the energy: if
- * that rises beyond `allowed`, the step is too long. False then, or if the state is not finite. */
+static void note_worst(morph_blanket_report *report, const morph_violation *v) {
+    report->worst_length = fmax(report->worst_length, v->length);
+    report->worst_post = fmax(report->worst_post, v->post);
+    report->worst_panel = fmax(report->worst_panel, v->panel);
+    report->worst_clearance = fmax(report->worst_clearance, v->clearance);
+}
+
+/* Steps through one frame. What gravity, springs and attraction give is within the energy, what hands, a
+ * rising target and actuators give within the work: if the energy rises beyond `allowed` and that, the step
+ * is too long. False then, or if the state is not finite or moves too far. */
 static bool advance(morph_blanket_state *b, int steps, double allowed) {
     b->step = b->def.frame / steps;
+    b->work = 0.0;
     for (int k = 0; k < steps; k++)
-        if (!morph_blanket_step(b) || !(morph_blanket_energy(b) <= allowed)) return false;
+        if (!morph_blanket_step(b) || !(morph_blanket_energy(b) <= allowed + fmax(0.0, b->work)))
+            return false;
     return true;
 }
 
@@ -60,56 +80,84 @@ static bool advance(morph_blanket_state *b, int steps, double allowed) {
  * and against one spacing's fall. Instability passes any such bound within a few steps. */
 static double allowed_energy(const morph_blanket_state *b) {
     const morph_structure *s = b->structure;
-    const double weight = s->def.mass * b->joints * b->def.gravity;
+    const double weight = s->def.mass * b->joints * b->pull;
     double kinetic = 0.0, spring = 0.0;
     morph_blanket_energies(b, &kinetic, &spring);
     return morph_blanket_energy(b) + 0.05 * (weight * s->spacing + kinetic + spring);
 }
 
-/* Back to the frame's start. */
-static void rewind_frame(morph_blanket_state *b) {
+/* What a frame starts from, to come back to. */
+typedef struct frame_start {
+    double time, lift, rise_clock, allowed;
+} frame_start;
+
+static frame_start keep_frame(morph_blanket_state *b) {
+    const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
+    memcpy(b->keep_x, b->x, bytes);
+    memcpy(b->keep_v, b->v, bytes);
+    return (frame_start){b->time, b->lift, b->rise_clock, allowed_energy(b)};
+}
+
+static void rewind_frame(morph_blanket_state *b, const frame_start *at) {
     const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
     memcpy(b->x, b->keep_x, bytes);
     memcpy(b->v, b->keep_v, bytes);
+    b->time = at->time;
+    b->lift = b->lift_to = at->lift;
+    b->rise_clock = at->rise_clock;
     morph_blanket_accelerations(b);
     morph_blanket_forget(b);
 }
 
-/* One frame, redone with half the step while it fails. A pose that projection is still sorting out (a start
- * far outside its limits) gains speed at any step: then the frame stands as it is, but its speed does not. */
-static morph_status next_frame(morph_blanket_state *b, int *steps, morph_blanket_report *report) {
-    const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
-    const double allowed = allowed_energy(b);
-    const int first = *steps;
-    memcpy(b->keep_x, b->x, bytes);
-    memcpy(b->keep_v, b->v, bytes);
-    bool good = advance(b, *steps, allowed);
-    for (int tries = 0; !good && tries < MOST_HALVINGS; tries++) {
-        *steps *= 2;
-        report->step_halvings++;
-        rewind_frame(b);
-        good = advance(b, *steps, allowed);
-    }
-    if (!good) {
-        *steps = first;
-        rewind_frame(b);
-        if (!advance(b, *steps, INFINITY)) return MORPH_ERR_NONFINITE;
-        memset(b->v, 0, bytes);
-    }
-    report->steps += *steps;
-    report->step = b->step;
-    return MORPH_OK;
+/* The step that should be stable and resolves the motion that forces make. */
+static double good_step(const morph_structure *s, const morph_blanket_def *def) {
+    const double pull = morph_blanket_pull(s, def);
+    const double step = morph_blanket_stable_step(s, def);
+    return pull > 0.0 ? fmin(step, LONGEST_STEP * sqrt(s->spacing / pull)) : step;
 }
 
-/* Steps that make a frame: of the length asked for, or what the springs and the motion allow; 0: too many. */
+/* Steps that make a frame: of the length asked for, or what the springs and forces allow; 0: too many. */
 static int steps_per_frame(const morph_structure *s, const morph_blanket_def *def) {
-    double step = def->step;
-    if (!(step > 0.0)) {
-        step = morph_blanket_stable_step(s);
-        if (def->gravity > 0.0) step = fmin(step, LONGEST_STEP * sqrt(s->spacing / def->gravity));
-    }
+    const double step = def->step > 0.0 ? def->step : good_step(s, def);
     const double steps = ceil(def->frame / step * (1.0 - 1e-12));
     return steps <= MOST_STEPS ? (int)fmax(steps, 1.0) : 0;
+}
+
+/* More of them while the blanket is fast. */
+static int steps_for_speed(const morph_blanket_state *b, int steps) {
+    double fastest = 0.0;
+    for (int k = 0; k < 3 * b->joints; k++)
+        fastest = fmax(fastest, fabs(b->v[k]));
+    const double most = b->def.frame * fastest / (PLANNED_MOVE * b->structure->spacing);
+    return (int)fmin(fmax(steps, ceil(most)), MOST_STEPS);
+}
+
+/* One frame, redone with half the step while it fails. A pose that projection is still sorting out (a start
+ * far outside its limits) gains speed at any step: then the frame stands as it is, but its speed does not. */
+static morph_status next_frame(morph_blanket_state *b, const frame_start *at, int *steps,
+                               morph_blanket_report *report) {
+    const int first = steps_for_speed(b, *steps);
+    const double least = LEAST_STEP * fmin(good_step(b->structure, &b->def), b->def.frame / first);
+    int now = first;
+    b->most_move = MOST_MOVE * b->structure->spacing;
+    bool good = advance(b, now, at->allowed);
+    while (!good && b->def.frame / now > least && now < MOST_STEPS / 2) {
+        now *= 2;
+        report->step_halvings++;
+        rewind_frame(b, at);
+        good = advance(b, now, at->allowed);
+    }
+    if (good && now > first) *steps = now;
+    if (!good) {
+        now = first;
+        rewind_frame(b, at);
+        b->most_move = INFINITY;
+        if (!advance(b, now, INFINITY)) return MORPH_ERR_NONFINITE;
+        memset(b->v, 0, 3 * (size_t)b->joints * sizeof(double));
+    }
+    report->steps += now;
+    report->step = b->step;
+    return MORPH_OK;
 }
 
 /* Mean over the frame of the fastest joint: a contact's trembling within it is no motion. */
@@ -120,24 +168,115 @@ static double frame_speed(const morph_blanket_state *b) {
     return most / b->def.frame;
 }
 
+/* The target is in the blanket because something holds that against it: the limit that is pushed hardest. */
+static void resisting(const morph_blanket_state *b, morph_blanket_report *report) {
+    double most = 0.0;
+    report->held_by = MORPH_BLANKET_CLEARANCE;
+    for (int l = 0; l < b->links; l++) {
+        const double push = fmax(b->push[l][0], b->push[l][1]);
+        if (push <= most) continue;
+        most = push;
+        report->held_by = MORPH_BLANKET_LENGTH;
+        report->held_element = l;
+    }
+    for (int t = 0; t < b->angles && most == 0.0; t++)
+        if (fmax(b->angle[t].push[0], b->angle[t].push[1]) > 0.0) {
+            report->held_by = MORPH_BLANKET_ANGLE;
+            report->held_element = t;
+        }
+}
+
+/* The limit that a pose breaks while the target rises; false if all hold. */
+static bool gives_way(const morph_blanket_state *b, const morph_violation *v, morph_blanket_report *report) {
+    const double spacing = b->structure->spacing;
+    report->held_element = -1;
+    if (v->length > MORPH_BLANKET_LENGTH_HELD * spacing) {
+        report->held_by = MORPH_BLANKET_LENGTH;
+        report->held_element = v->link;
+    } else if (v->angle > ANGLE_GIVES) {
+        report->held_by = MORPH_BLANKET_ANGLE;
+        report->held_element = v->tuple;
+    } else if (v->clearance > MORPH_BLANKET_CLEARANCE_HELD * spacing)
+        resisting(b, report);
+    else if (v->panel > MORPH_BLANKET_PANEL_HELD)
+        report->held_by = MORPH_BLANKET_PANEL;
+    else
+        return false;
+    return true;
+}
+
+static bool rising(const morph_blanket_state *b) {
+    return b->def.rise > 0.0 && !b->held_up && b->rise_clock < b->def.rise_time;
+}
+
+/* Whether the frame just run must not stand while the target rises. The motion aims inside its limits: where
+ * the unpolished state is beyond them, sweeps no longer hold what the target asks for. */
+static bool refused(const morph_blanket_state *b, const morph_violation *polished,
+                    morph_blanket_report *report) {
+    const morph_violation raw = morph_blanket_violation(b, b->x);
+    return gives_way(b, polished, report) || (!b->held_up && gives_way(b, &raw, report));
+}
+
+/* A frame and its record. Where the rising target would break a limit, the frame is done again with the
+ * target standing where it was, and if limits give way later, drawing back. */
+static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajectory *t,
+                                morph_blanket_report *report) {
+    const double time = t->frames * b->def.frame;
+    const bool rose = rising(b);
+    const frame_start at = keep_frame(b);
+    b->retreat = 0.0;
+    morph_status status = next_frame(b, &at, steps, report);
+    if (status != MORPH_OK) return status;
+    morph_violation v = record(b, time, t);
+    morph_blanket_report cause;
+    if ((rose || b->held_up) && refused(b, &v, &cause)) {
+        t->frames--;
+        rewind_frame(b, &at);
+        if (!b->held_up) {
+            report->held_time = at.time;
+            report->held_by = cause.held_by;
+            report->held_element = cause.held_element;
+        } else
+            b->retreat = RETREAT * b->structure->spacing / b->def.frame;
+        b->held_up = report->held_up = true;
+        status = next_frame(b, &at, steps, report);
+        if (status != MORPH_OK) return status;
+        v = record(b, time, t);
+    }
+    report->short_of = -b->lift;
+    note_worst(report, &v);
+    report->rest_speed = frame_speed(b);
+    return MORPH_OK;
+}
+
+/* Whether anything still drives the motion. */
+static bool driven(const morph_blanket_state *b) {
+    if (rising(b)) return true;
+    if (b->def.drive && b->time < b->def.drive->step * (b->def.drive->samples - 1)) return true;
+    for (int k = 0; k < b->def.hand_count; k++)
+        if (b->time < b->def.hands[k].to) return true;
+    return false;
+}
+
 static morph_status run(morph_blanket_state *b, int frames, const morph_control *control, morph_trajectory *t,
                         morph_blanket_report *report) {
     const morph_structure *s = b->structure;
-    const double speed = REST_SPEED * sqrt(b->def.gravity * s->spacing);
-    const double window = b->def.gravity > 0.0 ? REST_WINDOW * sqrt(s->spacing / b->def.gravity) : 0.0;
+    const double scale = b->def.gravity > 0.0 ? b->def.gravity : b->pull;
+    const double speed = REST_SPEED * sqrt(scale * s->spacing);
+    const double window = scale > 0.0 ? REST_WINDOW * sqrt(s->spacing / scale) : 0.0;
     int steps = steps_per_frame(s, &b->def);
     double calm = 0.0;
+    if (b->def.drive) morph_blanket_schedule(b);
     morph_blanket_polish(b, b->x);
     morph_blanket_accelerations(b);
-    record(b, 0.0, t, report);
+    const morph_violation v = record(b, 0.0, t);
+    note_worst(report, &v);
     while (t->frames < frames) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
-        const morph_status status = next_frame(b, &steps, report);
+        const morph_status status = record_next(b, &steps, t, report);
         if (status != MORPH_OK) return status;
-        report->rest_speed = frame_speed(b);
-        record(b, t->frames * b->def.frame, t, report);
-        morph_progress(control, "nominal", (double)t->frames / frames);
-        calm = report->rest_speed <= speed ? calm + b->def.frame : 0.0;
+        morph_progress(control, b->def.drive ? "replay" : "nominal", (double)t->frames / frames);
+        calm = report->rest_speed <= speed && !driven(b) ? calm + b->def.frame : 0.0;
         report->at_rest = calm > 0.0 && calm >= window;
         if (report->at_rest) break;
     }

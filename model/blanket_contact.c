@@ -16,6 +16,12 @@
 #define LONGEST_STRIDE 0.25
 #define SHORTEST_STRIDE 0.01
 
+/* Following a place along its step: from which motion on and how near counts as there, in radii; strides grow
+ * at least by SWEPT_CLOSE radii / MOST_SLOPE, and the last one counts as there. */
+#define SWEPT_FROM 0.5
+#define SWEPT_CLOSE 0.05
+#define SWEPT_STRIDES 64
+
 static morph_touch *add_touch(morph_blanket_state *b, const int *joint, int corners, const double *weight,
                               double radius) {
     morph_touch *t = &b->touch[b->touches++];
@@ -44,7 +50,8 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     b->contact = morph_alloc(most + (size_t)s->joints, sizeof *b->contact);
     b->hold = morph_alloc(most + (size_t)s->joints, sizeof *b->hold);
     b->spare_touch = morph_alloc(most, sizeof *b->spare_touch);
-    if (!b->touch || !b->contact || !b->hold || !b->spare_touch) return MORPH_ERR_NOMEM;
+    b->memo = morph_alloc((size_t)(s->links + s->skin_triangles), sizeof *b->memo);
+    if (!b->touch || !b->contact || !b->hold || !b->spare_touch || !b->memo) return MORPH_ERR_NOMEM;
     if (!b->sdf) return MORPH_OK;
     for (int j = 0; j < s->joints; j++)
         add_touch(b, &j, 1, &whole, s->def.radius);
@@ -70,6 +77,12 @@ static void place_of(const double *x, const int *joint, int corners, const doubl
     }
 }
 
+/* A place as the target sees it: the target's lift taken off. */
+static double distance_at(const morph_blanket_state *b, const double q[3], double *g) {
+    const double p[3] = {q[0], q[1], q[2] - b->lift_to};
+    return morph_sdf_eval(b->sdf, p, g, NULL);
+}
+
 static double extent_of(const morph_touch *t, const double *x) {
     double extent = 0.0;
     for (int j = 0; j < t->corners; j++)
@@ -87,7 +100,7 @@ static double seek(const morph_blanket_state *b, morph_touch *t, const double *x
         for (int k = 0; k < t->corners; k++)
             weight[k] = (1.0 - t->stride) * t->weight[k] + (k == j ? t->stride : 0.0);
         place_of(x, t->joint, t->corners, weight, q);
-        const double here = morph_sdf_eval(b->sdf, q, NULL, NULL);
+        const double here = distance_at(b, q, NULL);
         if (here < lowest) {
             lowest = here;
             memcpy(best, weight, sizeof best);
@@ -105,7 +118,7 @@ static double seek(const morph_blanket_state *b, morph_touch *t, const double *x
 static bool set_plane(const morph_blanket_state *b, morph_contact *c, const double *x, double radius) {
     double q[3], g[3];
     place_of(x, c->joint, c->corners, c->weight, q);
-    const double phi = morph_sdf_eval(b->sdf, q, g, NULL);
+    const double phi = distance_at(b, q, g);
     const double slope = morph_norm(g);
     if (!(slope > 1e-6)) return false; /* a ridge inside the target: neighbours will lead out */
     for (int k = 0; k < 3; k++)
@@ -126,18 +139,49 @@ static morph_contact *add_contact(morph_blanket_state *b, const int *joint, int 
     for (int k = 0; k < corners; k++) {
         c->joint[k] = joint[k];
         c->weight[k] = weight[k];
-        sum += weight[k] * weight[k];
+        c->share[k] = weight[k] * b->weight[joint[k]];
+        sum += weight[k] * c->share[k];
     }
-    c->inverse = 1.0 / sum;
+    c->inverse = sum > 0.0 ? 1.0 / sum : 0.0; /* all held: nothing to correct */
     place_of(b->before, c->joint, c->corners, c->weight, c->before);
+    if (source < b->touches) c->before[2] += b->lift_to - b->lift; /* friction holds to the target */
     return c;
+}
+
+/* A place that moves far in a step is followed along its way, in strides that the distance's slope makes
+ * safe: where it first comes near the target, the half space stands there, on the side it came from. What
+ * moves less than its radius cannot pass the middle of even the thinnest target. */
+static bool swept(const morph_blanket_state *b, morph_contact *c, const double *x, double radius) {
+    double q0[3], q1[3], way[3], g[3], t = 0.0;
+    memcpy(q0, c->before, sizeof q0);
+    place_of(x, c->joint, c->corners, c->weight, q1);
+    morph_sub(q1, q0, way);
+    const double length = morph_norm(way), close = SWEPT_CLOSE * radius;
+    if (!(length > SWEPT_FROM * radius)) return false;
+    for (int k = 0; k < SWEPT_STRIDES; k++) {
+        const double q[3] = {q0[0] + t * way[0], q0[1] + t * way[1], q0[2] + t * way[2]};
+        const double gap = distance_at(b, q, g) - radius;
+        if (gap <= close || k + 1 == SWEPT_STRIDES) {
+            const double slope = morph_norm(g);
+            if (!(slope > 1e-6) || morph_dot(g, way) >= 0.0) return false; /* leaves: the end decides */
+            for (int m = 0; m < 3; m++)
+                c->normal[m] = g[m] / slope;
+            c->level = morph_dot(c->normal, q) - fmax(gap, 0.0) / fmax(slope, LEAST_SLOPE) +
+                       CONTACT_MARGIN * b->structure->spacing;
+            c->radius = -1.0; /* the plane stays */
+            return true;
+        }
+        t += gap / (MOST_SLOPE * length);
+        if (t >= 1.0) return false;
+    }
+    return false;
 }
 
 static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double move) {
     if (b->path + move < t->wake) return;
     double q[3];
     place_of(x, t->joint, t->corners, t->weight, q);
-    double gap = morph_sdf_eval(b->sdf, q, NULL, NULL) - t->radius;
+    double gap = distance_at(b, q, NULL) - t->radius;
     const double near = NEAR * b->structure->spacing + move;
     const double reach = t->stride > 0.0 ? extent_of(t, x) : 0.0;
     const double spare = gap / MOST_SLOPE - reach - near;
@@ -148,7 +192,7 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     if (t->stride > 0.0) gap = seek(b, t, x, gap + t->radius) - t->radius;
     if (gap > near) return;
     morph_contact *c = add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
-    if (set_plane(b, c, x, t->radius)) b->contacts++;
+    if (swept(b, c, x, t->radius) || set_plane(b, c, x, t->radius)) b->contacts++;
 }
 
 /* Links and skin lie above the plane wherever their joints do. */
@@ -169,19 +213,24 @@ void morph_blanket_forget(morph_blanket_state *b) {
     for (int t = 0; t < b->touches; t++)
         b->touch[t].wake = 0.0;
     for (int t = 0; t < b->angles; t++)
-        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+        b->angle[t].push[0] = b->angle[t].push[1] = b->angle[t].wake = 0.0;
+    memset(b->link_wake, 0, (size_t)b->links * sizeof *b->link_wake);
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
 }
 
-void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
+double morph_blanket_moved(const morph_blanket_state *b, const double *x) {
     double fastest = 0.0;
     for (int j = 0; j < b->joints; j++) {
         double move[3];
         morph_sub(&x[3 * j], &b->before[3 * j], move);
         fastest = fmax(fastest, morph_dot(move, move));
     }
-    const double move = sqrt(fastest);
+    return sqrt(fastest);
+}
+
+void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
+    const double move = morph_blanket_moved(b, x) + fabs(b->lift_to - b->lift);
     b->contacts = 0;
     for (int t = 0; t < b->touches; t++)
         find_target(b, &b->touch[t], x, move);
@@ -198,7 +247,7 @@ void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
 static void move_corners(const morph_contact *c, double *x, const double change[3]) {
     for (int j = 0; j < c->corners; j++)
         for (int k = 0; k < 3; k++)
-            x[3 * c->joint[j] + k] += c->weight[j] * change[k];
+            x[3 * c->joint[j] + k] += c->share[j] * change[k];
 }
 
 /* Sets the friction to `want` without its normal part, cut to the cone; returns the change in `change`. */
@@ -271,54 +320,86 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
         if (b->path < t->wake) continue;
         double q[3];
         place_of(x, t->joint, t->corners, t->weight, q);
-        depth = fmax(depth, t->radius - morph_sdf_eval(b->sdf, q, NULL, NULL));
+        depth = fmax(depth, t->radius - distance_at(b, q, NULL));
     }
     return depth;
 }
 
-/* One contact at the deepest place of an element by exact distance; returns its violation. */
-static double find_deepest(morph_blanket_state *b, const double *x, const int *joint, int corners,
-                           double radius) {
-    const double near = NEAR * b->structure->spacing;
-    double weight[3] = {0.0};
-    morph_closest at;
+/* Corners of an element as the target sees them; its exact distance less the radius, where it is nearest. */
+static double exact_gap(const morph_blanket_state *b, const double v[3][3], int corners, double radius,
+                        double weight[3], morph_closest *at) {
     if (corners == 2)
-        morph_distance_segment(b->exact, &x[3 * joint[0]], &x[3 * joint[1]], weight, &at);
+        morph_distance_segment(b->exact, v[0], v[1], weight, at);
     else
-        morph_distance_triangle(b->exact, &x[3 * joint[0]], &x[3 * joint[1]], &x[3 * joint[2]], weight, &at);
-    if (at.distance - radius > near) return 0.0;
-    morph_contact *c = add_contact(b, joint, corners, weight, 0);
-    double q[3];
-    place_of(x, joint, corners, weight, q);
+        morph_distance_triangle(b->exact, v[0], v[1], v[2], weight, at);
+    return at->distance - radius;
+}
+
+static void place_element(const morph_blanket_state *b, const double *x, const int *joint, int corners,
+                          double v[3][3]) {
+    for (int k = 0; k < corners; k++) {
+        memcpy(v[k], &x[3 * joint[k]], sizeof v[k]);
+        v[k][2] -= b->lift_to;
+    }
+}
+
+/* Elements that may touch: skin triangles and the links that are no edges of them. */
+typedef struct element {
+    const int *joint;
+    int corners;
+    double radius;
+    bool tested;
+} element;
+
+static element element_of(const morph_structure *s, int n) {
+    if (n >= s->links) return (element){s->skin[n - s->links], 3, s->def.radius, true};
+    return (element){s->link[n], 2, s->link_radius[n], s->link_kind[n] != MORPH_LINK_BOTTOM};
+}
+
+double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
+    const morph_structure *s = b->structure;
+    double depth = base_depth(b, x);
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        const element e = element_of(s, n);
+        if (!e.tested) continue;
+        morph_memo *memo = &b->memo[n];
+        double v[3][3], weight[3], moved = 0.0;
+        morph_closest at;
+        place_element(b, x, e.joint, e.corners, v);
+        for (int k = 0; k < e.corners && memo->known; k++)
+            moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
+        if (memo->known && memo->gap - moved >= 0.0) continue;
+        memo->gap = exact_gap(b, v, e.corners, e.radius, weight, &at);
+        memo->known = true;
+        memcpy(memo->corner, v, sizeof v);
+        depth = fmax(depth, -memo->gap);
+    }
+    return depth;
+}
+
+/* One contact at the deepest place of an element. */
+static void find_deepest(morph_blanket_state *b, const double *x, const element *e) {
+    double v[3][3], weight[3] = {0.0}, q[3];
+    morph_closest at;
+    place_element(b, x, e->joint, e->corners, v);
+    if (exact_gap(b, v, e->corners, e->radius, weight, &at) > NEAR * b->structure->spacing) return;
+    morph_contact *c = add_contact(b, e->joint, e->corners, weight, 0);
+    place_of(x, e->joint, e->corners, weight, q);
     memcpy(c->normal, at.normal, sizeof c->normal);
-    c->level = morph_dot(c->normal, q) - at.distance + radius + CONTACT_MARGIN * b->structure->spacing;
+    c->level = morph_dot(c->normal, q) - at.distance + e->radius + CONTACT_MARGIN * b->structure->spacing;
     c->radius = -1.0; /* the plane stays */
     b->contacts++;
-    return fmax(0.0, radius - at.distance);
 }
 
-/* Whether any of the touches [from, to) has been near lately. */
-static bool awake(const morph_blanket_state *b, int from, int to) {
-    for (int t = from; t < to; t++)
-        if (b->path >= b->touch[t].wake) return true;
-    return false;
-}
-
-double morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
+void morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
-    double depth = 0.0;
-    int t = s->joints;
     b->contacts = 0;
-    for (int l = 0; l < s->links; l++) {
-        /* Links of the skin's layer are edges of its triangles. */
-        const bool edge = s->link_kind[l] == MORPH_LINK_BOTTOM;
-        const int from = t;
-        t += edge ? 3 : 4;
-        if (!edge && awake(b, from, t))
-            depth = fmax(depth, find_deepest(b, x, s->link[l], 2, s->link_radius[l]));
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        const element e = element_of(s, n);
+        const morph_memo *memo = &b->memo[n];
+        /* What is far by its last distance is far still. */
+        if (e.tested && !(memo->known && memo->gap > 2.0 * NEAR * b->structure->spacing))
+            find_deepest(b, x, &e);
     }
-    for (int k = 0; k < s->skin_triangles; k++, t += 5)
-        if (awake(b, t, t + 5)) depth = fmax(depth, find_deepest(b, x, s->skin[k], 3, s->def.radius));
     if (!isnan(b->def.base)) find_base(b, x, 0.0);
-    return fmax(depth, base_depth(b, x));
 }

@@ -3,11 +3,29 @@
 
 #include <string.h>
 
+double morph_blanket_softening(const morph_structure *s, const morph_blanket_def *def) {
+    return def->softening > 0.0 ? def->softening : s->spacing;
+}
+
+/* Largest acceleration that attraction and hands give a joint: |F| = s r/p^3 has its maximum
+ * 2/(3 sqrt 3) s/e^2. */
+double morph_blanket_pull(const morph_structure *s, const morph_blanket_def *def) {
+    const double soft = morph_blanket_softening(s, def);
+    double pull = 0.0, push = 0.0;
+    for (int k = 0; k < def->attractor_count; k++)
+        pull += 2.0 / (3.0 * sqrt(3.0)) * fabs(def->attractors[k].strength) / (soft * soft);
+    for (int k = 0; k < def->hand_count; k++)
+        push = fmax(push, morph_norm(def->hands[k].force));
+    return def->gravity + (pull + push) / s->def.mass;
+}
+
 /* A link's spring has the stiffness block k d d^T between its joints and minus that across. By Gershgorin's
  * theorem in blocks no squared frequency of K/m exceeds max over joints of sum over its links (k + k) / m,
- * whatever the pose. The leapfrog is stable for omega step < 2; a quarter of that keeps the frequency error
- * (omega step)^2 / 24 of the stiffest mode at 1 %. */
-double morph_blanket_stable_step(const morph_structure *s) {
+ * whatever the pose; a centre of attraction adds at most s/e^3 / m. The leapfrog is stable for
+ * omega step < 2; a quarter of that keeps the frequency error (omega step)^2 / 24 of the stiffest mode at
+ * 1 %. */
+double morph_blanket_stable_step(const morph_structure *s, const morph_blanket_def *def) {
+    const double soft = morph_blanket_softening(s, def);
     int most = 1;
     for (int j = 0; j < s->joints; j++) {
         int links = 0;
@@ -15,17 +33,16 @@ double morph_blanket_stable_step(const morph_structure *s) {
             if (s->link[l][0] == j || s->link[l][1] == j) links++;
         if (links > most) most = links;
     }
-    return 0.5 / sqrt(2.0 * most * s->def.stiffness / s->def.mass);
+    double square = def->drive ? 0.0 : 2.0 * most * s->def.stiffness;
+    for (int k = 0; k < def->attractor_count; k++)
+        square += fabs(def->attractors[k].strength) / (soft * soft * soft);
+    return 0.5 / sqrt(square / s->def.mass);
 }
 
-/* m a = -m g e_z + sum over links of k (L - L0) d/L. */
-void morph_blanket_accelerations(morph_blanket_state *b) {
+/* Adds the springs' k (L - L0) d/L over m. */
+static void add_springs(morph_blanket_state *b) {
     const morph_structure *s = b->structure;
     const double scale = s->def.stiffness / s->def.mass;
-    for (int j = 0; j < b->joints; j++) {
-        b->a[3 * j] = b->a[3 * j + 1] = 0.0;
-        b->a[3 * j + 2] = -b->def.gravity;
-    }
     for (int l = 0; l < b->links; l++) {
         double *ai = &b->a[3 * s->link[l][0]], *aj = &b->a[3 * s->link[l][1]], d[3];
         morph_sub(&b->x[3 * s->link[l][1]], &b->x[3 * s->link[l][0]], d);
@@ -39,11 +56,38 @@ void morph_blanket_accelerations(morph_blanket_state *b) {
     }
 }
 
+static bool pushes(const morph_hand *hand, double time) {
+    return time >= hand->from && time < hand->to;
+}
+
+/* m a = -m g e_z + springs + attraction + hands. */
+void morph_blanket_accelerations(morph_blanket_state *b) {
+    const double inverse = 1.0 / b->structure->def.mass;
+    const double soft = morph_blanket_softening(b->structure, &b->def);
+    for (int j = 0; j < b->joints; j++) {
+        double force[3] = {0.0};
+        for (int k = 0; k < b->def.attractor_count; k++)
+            morph_attraction(&b->def.attractors[k], soft, &b->x[3 * j], force, NULL);
+        for (int k = 0; k < 3; k++)
+            b->a[3 * j + k] = inverse * force[k] - (k == 2 ? b->def.gravity : 0.0);
+    }
+    for (int h = 0; h < b->def.hand_count; h++) {
+        const morph_hand *hand = &b->def.hands[h];
+        for (int k = 0; k < 3 && pushes(hand, b->time); k++)
+            b->a[3 * hand->joint + k] += inverse * hand->force[k];
+    }
+    if (!b->def.drive) add_springs(b);
+    for (int j = 0; j < b->joints && b->def.fixed_count > 0; j++)
+        for (int k = 0; k < 3; k++)
+            b->a[3 * j + k] *= b->weight[j];
+}
+
 void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, double *spring) {
     const morph_structure *s = b->structure;
     *kinetic = *spring = 0.0;
     for (int k = 0; k < 3 * b->joints; k++)
         *kinetic += 0.5 * s->def.mass * b->v[k] * b->v[k];
+    if (b->def.drive) return;
     for (int l = 0; l < b->links; l++) {
         const double stretch =
             morph_dist(&b->x[3 * s->link[l][0]], &b->x[3 * s->link[l][1]]) - s->start_length[l];
@@ -52,11 +96,15 @@ void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, doubl
 }
 
 double morph_blanket_energy(const morph_blanket_state *b) {
-    double kinetic, spring, height = 0.0;
+    double kinetic, spring, height = 0.0, attraction = 0.0;
     morph_blanket_energies(b, &kinetic, &spring);
-    for (int j = 0; j < b->joints; j++)
+    const double soft = morph_blanket_softening(b->structure, &b->def);
+    for (int j = 0; j < b->joints; j++) {
         height += b->x[3 * j + 2];
-    return kinetic + spring + b->structure->def.mass * b->def.gravity * height;
+        for (int k = 0; k < b->def.attractor_count; k++)
+            attraction += morph_attraction(&b->def.attractors[k], soft, &b->x[3 * j], NULL, NULL);
+    }
+    return kinetic + spring + attraction + b->structure->def.mass * b->def.gravity * height;
 }
 
 /* exp(-2 beta) to second order, without ringing when beta is large. */
@@ -71,10 +119,12 @@ static void damp_pair(morph_blanket_state *b, const int ends[2], double factor) 
     morph_sub(vj, vi, w);
     const double square = morph_dot(d, d);
     if (!(square > 0.0)) return;
-    const double change = 0.5 * (1.0 - factor) * morph_dot(w, d) / square;
+    const double wi = b->weight[ends[0]], wj = b->weight[ends[1]];
+    if (wi + wj == 0.0) return;
+    const double change = (1.0 - factor) * morph_dot(w, d) / (square * (wi + wj));
     for (int k = 0; k < 3; k++) {
-        vi[k] += change * d[k];
-        vj[k] -= change * d[k];
+        vi[k] += wi * change * d[k];
+        vj[k] -= wj * change * d[k];
     }
 }
 
@@ -116,22 +166,34 @@ static void drag(morph_blanket_state *b, double h) {
  * 5e-3 sqrt(gravity spacing) unless sweeps are three times as many; with all, they tremble. */
 #define WARM 0.7
 
-/* Drift, then everything hard by projection; what the projection moved becomes velocity, so an impact is
- * plastic and a held constraint carries no speed. */
-static bool drift(morph_blanket_state *b) {
-    const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
-    memcpy(b->before, b->x, bytes);
-    for (int k = 0; k < 3 * b->joints; k++)
-        b->x[k] += b->step * b->v[k];
-    if (!morph_blanket_finite(b)) return false;
-    morph_blanket_project_posts_along(b);
-    morph_blanket_find_contacts(b, b->x);
-    morph_blanket_project_start(b, b->x, WARM);
-    for (int sweep = 0; sweep < MORPH_BLANKET_SWEEPS; sweep++) {
-        if (sweep == MORPH_BLANKET_SWEEPS / 2) morph_blanket_renew_contacts(b, b->x);
-        morph_blanket_sweep(b, b->x, (sweep & 1) != 0, b->def.friction);
+/* What the hands, the target on its way and the actuators did in this step: force times motion. A projection
+ * that moves a joint of mass m by c in a step h has pushed with m c / h^2. */
+static double step_work(const morph_blanket_state *b) {
+    const double mass = b->structure->def.mass, force = mass / (b->step * b->step);
+    double work = 0.0;
+    for (int h = 0; h < b->def.hand_count; h++) {
+        const morph_hand *hand = &b->def.hands[h];
+        double move[3];
+        morph_sub(&b->x[3 * hand->joint], &b->before[3 * hand->joint], move);
+        if (pushes(hand, b->time) || pushes(hand, b->time + b->step)) work += morph_dot(hand->force, move);
     }
-    morph_blanket_keep_contacts(b);
+    for (int n = 0; n < b->contacts && b->lift_to != b->lift; n++) {
+        const morph_contact *c = &b->contact[n];
+        if (c->source < b->touches)
+            work += force * (c->push * c->normal[2] + c->drag[2]) * (b->lift_to - b->lift);
+    }
+    for (int l = 0; l < b->links && b->def.drive; l++) {
+        const int *ends = b->structure->link[l];
+        const double change = morph_dist(&b->x[3 * ends[1]], &b->x[3 * ends[0]]) -
+                              morph_dist(&b->before[3 * ends[1]], &b->before[3 * ends[0]]);
+        work += 0.5 * force * (b->push[l][0] - b->push[l][1]) * change;
+    }
+    return work;
+}
+
+/* What the projection moved becomes velocity, so an impact is plastic and a held constraint carries no speed.
+ * Returns the longest motion of a joint. */
+static double take_velocity(morph_blanket_state *b) {
     double fastest = 0.0;
     for (int j = 0; j < b->joints; j++) {
         double move[3];
@@ -140,17 +202,43 @@ static bool drift(morph_blanket_state *b) {
             b->v[3 * j + k] = move[k] / b->step;
         fastest = fmax(fastest, morph_dot(move, move));
     }
-    b->path += sqrt(fastest);
+    return sqrt(fastest);
+}
+
+/* Drift, then everything hard by projection. False when a joint moves further than contacts are safe for. */
+static bool drift(morph_blanket_state *b) {
+    const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
+    memcpy(b->before, b->x, bytes);
+    double fastest = 0.0;
+    for (int k = 0; k < 3 * b->joints; k++) {
+        b->x[k] += b->step * b->v[k];
+        fastest = fmax(fastest, fabs(b->step * b->v[k]));
+    }
+    if (!(fastest <= b->most_move) || !morph_blanket_finite(b)) return false;
+    morph_blanket_project_posts_along(b);
+    morph_blanket_list_limits(b, b->x, morph_blanket_moved(b, b->x), false);
+    morph_blanket_find_contacts(b, b->x);
+    morph_blanket_project_start(b, b->x, WARM);
+    for (int sweep = 0; sweep < MORPH_BLANKET_SWEEPS; sweep++) {
+        if (sweep == MORPH_BLANKET_SWEEPS / 2) morph_blanket_renew_contacts(b, b->x);
+        morph_blanket_sweep(b, b->x, (sweep & 1) != 0, b->def.friction);
+    }
+    morph_blanket_keep_contacts(b);
+    b->path += take_velocity(b) + fabs(b->lift_to - b->lift);
+    b->work += step_work(b);
     return morph_blanket_finite(b);
 }
 
 /* Kick-drift-kick; drag and dampers wrap it symmetrically. */
 bool morph_blanket_step(morph_blanket_state *b) {
     const double h = 0.5 * b->step;
+    morph_blanket_schedule(b);
     drag(b, h);
     damp(b, h, false);
     kick(b, h);
     if (!drift(b)) return false;
+    b->time += b->step;
+    b->lift = b->lift_to;
     morph_blanket_accelerations(b);
     kick(b, h);
     damp(b, h, true);

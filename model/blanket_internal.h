@@ -1,8 +1,9 @@
 /* Inside the blanket: its mutable state and the pieces that move it. For model/blanket*.c and their tests.
  *
- * Every joint has the same mass, so the mass-weighted corrections of the projections weigh all joints alike:
- * a constraint c(x) is corrected by dx_j = -c grad_j / sum_k |grad_k|^2, which keeps linear momentum wherever
- * the gradients of one constraint add up to zero. */
+ * Every free joint has the same mass, so the mass-weighted corrections of the projections weigh them alike:
+ * a constraint c(x) is corrected by dx_j = -c w_j grad_j / sum_k w_k |grad_k|^2 with w = 1 for a free joint
+ * and 0 for one that is held, which keeps linear momentum wherever no joint is held and the gradients of one
+ * constraint add up to zero. */
 #ifndef MORPH_BLANKET_INTERNAL_H
 #define MORPH_BLANKET_INTERNAL_H
 
@@ -28,8 +29,9 @@ typedef struct morph_contact {
     double weight[3];
     double normal[3], level;
     double before[3]; /* q at the step's start: friction acts on the motion since */
-    double inverse;   /* 1 / sum weight^2 */
-    double radius;    /* of the place; -1: a contact with the base plane */
+    double share[3];  /* weight times the joint's own */
+    double inverse;   /* 1 / sum weight share */
+    double radius;    /* of the place; -1: the plane stays as it is in this step */
     int source;       /* number of the touch; touches + joint for the base plane */
     double push;      /* accumulated along the normal, >= 0 (m per unit weight) */
     double drag[3];   /* accumulated friction, at most friction * push */
@@ -40,13 +42,28 @@ typedef struct morph_angle {
     int joint[4], joints;
     int far[2]; /* where the arms end */
     double su[4], sv[4];
+    double weight[4];       /* of its joints */
     double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
     double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
+    double wake;            /* path length (state.path) before which it cannot reach a limit */
 } morph_angle;
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
 #define MORPH_BLANKET_SWEEPS 12
+
+/* What counts as held: lengths a tenth of a millionth part of what a link moves through, clearance what a
+ * plan's clearance is checked to (spacings); panels what a plan's are checked to (sine). Posts come out exact
+ * to rounding. */
+#define MORPH_BLANKET_LENGTH_HELD 1e-9
+#define MORPH_BLANKET_CLEARANCE_HELD 1e-3
+#define MORPH_BLANKET_PANEL_HELD 1e-6
+
+/* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
+typedef struct morph_memo {
+    double corner[3][3], gap;
+    bool known;
+} morph_memo;
 
 /* How far the state is from its limits; violations are >= 0. */
 typedef struct morph_violation {
@@ -54,6 +71,8 @@ typedef struct morph_violation {
     double post;      /* relative */
     double clearance; /* m, at the places known */
     double angle;     /* in cosine */
+    double panel;     /* sine */
+    int link, tuple;  /* where length and angle are worst */
 } morph_violation;
 
 typedef struct morph_blanket_state {
@@ -62,15 +81,29 @@ typedef struct morph_blanket_state {
     const morph_distance *exact; /* may be NULL */
     morph_blanket_def def;
     int joints, links, posts, angles, touches, contacts;
-    double step;             /* s */
+    double step;          /* s */
+    double time;          /* s, at the step's start */
+    double pull;          /* largest acceleration by gravity, attraction and hands, m/s2 */
+    double *weight;       /* joints: 1 free, 0 held */
+    double lift, lift_to; /* target above its place at the step's start and end, m */
+    double rise_clock;    /* s the target has risen for; stands when it is held up */
+    bool held_up;
+    double retreat;          /* of a target that was held up, m/s */
+    double most_move;        /* m in a step */
+    double work;             /* done on the blanket since the frame's start by what it does not store, J */
     double path;             /* sum over the steps of the fastest joint's motion, m */
     double *x, *v;           /* 3*joints */
     double *a;               /* acceleration at x by springs and gravity */
     double *before;          /* x at the step's start */
     double *keep_x, *keep_v; /* for a second try with a smaller step */
-    double (*limit)[2];      /* links: what the projection aims at, a little inside the structure's limits */
+    double (*bound)[2];      /* links: the limits that hold: the structure's, or the prescribed lengths */
+    double (*limit)[2];      /* links: what the projection aims at, a little inside */
     double (*push)[2];       /* links: accumulated corrections of this step at the two limits */
+    double *link_wake;       /* links: path length before which it cannot reach a limit */
+    int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
+    int near_links, near_angles;
     morph_angle *angle;
+    morph_memo *memo; /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
@@ -80,7 +113,7 @@ typedef struct morph_blanket_state {
     morph_touch *spare_touch;
 } morph_blanket_state;
 
-/* sdf may be NULL (no target). Validates def; x0 is copied, velocities are 0. */
+/* sdf may be NULL (no target). Validates def; x0 is copied. */
 morph_status morph_blanket_state_create(const morph_structure *s, const morph_sdf *sdf,
                                         const morph_blanket_def *def, const double *x0,
                                         morph_blanket_state **out);
@@ -88,23 +121,40 @@ void morph_blanket_state_destroy(morph_blanket_state *b); /* NULL allowed */
 bool morph_blanket_finite(const morph_blanket_state *b);  /* x and v */
 
 /* blanket_force.c. None of these allocates. */
-double morph_blanket_stable_step(const morph_structure *s); /* largest step to use, s */
-void morph_blanket_accelerations(morph_blanket_state *b);   /* a from x */
-double morph_blanket_energy(const morph_blanket_state *b);  /* kinetic + springs + gravity, J */
+double morph_blanket_softening(const morph_structure *s, const morph_blanket_def *def); /* m */
+/* Largest acceleration of a joint by gravity, attraction and hands, m/s2. */
+double morph_blanket_pull(const morph_structure *s, const morph_blanket_def *def);
+/* Largest step to use, s; infinite where nothing is elastic. */
+double morph_blanket_stable_step(const morph_structure *s, const morph_blanket_def *def);
+void morph_blanket_accelerations(morph_blanket_state *b); /* a from x and time */
+/* Kinetic, springs, gravity, attraction, J. */
+double morph_blanket_energy(const morph_blanket_state *b);
 void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, double *spring); /* J */
-/* One step of b->step. False when the state is not finite any more. */
+/* One step of b->step. False when the state is not finite any more or moves further than most_move. */
 bool morph_blanket_step(morph_blanket_state *b);
+
+/* blanket_schedule.c: where the target and the prescribed lengths are at the end of the coming step. */
+void morph_blanket_schedule(morph_blanket_state *b);
+/* Lift of the target after it has risen for `clock` seconds, m. */
+double morph_blanket_lift(const morph_blanket_def *def, double clock);
 
 /* blanket_project.c */
 morph_status morph_blanket_limits_create(morph_blanket_state *b);
+/* Lists the lengths and angles that can reach a limit while joints move by up to `move` and what sweeps add.
+ * What is far is not looked at again before the joints have moved enough; `all`: look at every one, whatever
+ * was noted, and note nothing. */
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all);
 /* Applies `warm` times the corrections of the last step to x (0: forgets them): at rest every step needs the
  * same ones, so that a few sweeps a step converge over many steps. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
 /* One pass over angles, lengths, contacts and posts of x; backward turns the order round. */
 void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
+double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
 double morph_blanket_cosine(const morph_angle *a, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
+/* blanket_polish.c: what the unpolished state breaks. */
+morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x);
 /* blanket_polish.c: sweeps until x holds the structure's own limits or stops improving; contact by the exact
  * distance where there is one. Velocities are not touched. Returns what is left. */
 morph_violation morph_blanket_polish(morph_blanket_state *b, double *x);
@@ -113,14 +163,19 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x);
 morph_status morph_blanket_touches_create(morph_blanket_state *b);
 /* After x was set from outside: forgets what is far, and the last step's corrections. */
 void morph_blanket_forget(morph_blanket_state *b);
+/* Longest motion of a joint from `before` to x, m. */
+double morph_blanket_moved(const morph_blanket_state *b, const double *x);
 /* Lists the contacts near x; `before` in the state is where friction counts from. */
 void morph_blanket_find_contacts(morph_blanket_state *b, const double *x);
 /* Planes of the listed contacts anew at x, corrections kept. */
 void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x);
 /* Deepest violation of a place's radius or the base plane at x, m, >= 0. */
 double morph_blanket_depth(const morph_blanket_state *b, const double *x);
-/* The same by exact distances over whole links and triangles, listed as contacts on the way. */
-double morph_blanket_find_exact(morph_blanket_state *b, const double *x);
+/* The same by exact distances over whole links and triangles. An element that has moved less than its last
+ * distance left over is not measured again. */
+double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
+/* Lists the contacts near x by exact distances. */
+void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
 /* Part of project_start; most: largest push to start with, m. */
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */

@@ -9,45 +9,56 @@
 #define SWEEPS 8
 /* Rounds with contact by exact distances, which cost a tree search per element. */
 #define EXACT_ROUNDS 6
-/* What counts as held, in spacings: lengths a tenth of what a plan's lengths are checked to (1e-6), clearance
- * what a plan's clearance is checked to. Posts come out exact to rounding. */
-#define LENGTH_HELD 1e-7
-#define CLEARANCE_HELD 1e-3
-
-/* Of lengths, posts and angles at x. */
+/* Of lengths, posts, panels and angles at x. */
 static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
-    morph_violation worst = {0};
+    morph_violation worst = {.link = -1, .tuple = -1};
     for (int l = 0; l < b->links; l++) {
         const double length = morph_dist(&x[3 * s->link[l][0]], &x[3 * s->link[l][1]]);
-        worst.length = fmax(worst.length, s->length_limit[l][0] - length);
-        worst.length = fmax(worst.length, length - s->length_limit[l][1]);
+        const double over = fmax(b->bound[l][0] - length, length - b->bound[l][1]);
+        if (over <= worst.length) continue;
+        worst.length = over;
+        worst.link = l;
     }
     for (int p = 0; p < b->posts; p++) {
         const double length = morph_dist(&x[3 * s->post[p][0]], &x[3 * s->post[p][1]]);
         worst.post = fmax(worst.post, fabs(length / s->post_length[p] - 1.0));
     }
+    for (int p = 0; p < s->panels; p++)
+        worst.panel = fmax(worst.panel, fabs(morph_blanket_panel_sine(s, p, x)));
     for (int t = 0; t < b->angles; t++) {
         const double c = morph_blanket_cosine(&b->angle[t], x);
-        worst.angle = fmax(worst.angle, fmax(b->angle[t].lowest - c, c - b->angle[t].highest));
+        const double over = fmax(b->angle[t].lowest - c, c - b->angle[t].highest);
+        if (over <= worst.angle) continue;
+        worst.angle = over;
+        worst.tuple = t;
     }
     return worst;
 }
 
 static bool held(const morph_blanket_state *b, const morph_violation *v) {
     const double spacing = b->structure->spacing;
-    return v->length <= LENGTH_HELD * spacing && v->clearance <= CLEARANCE_HELD * spacing && v->post < 1e-12;
+    return v->length <= MORPH_BLANKET_LENGTH_HELD * spacing &&
+           v->clearance <= MORPH_BLANKET_CLEARANCE_HELD * spacing && v->post < 1e-12 &&
+           v->panel <= MORPH_BLANKET_PANEL_HELD;
+}
+
+morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x) {
+    morph_violation v = member_violation(b, x);
+    v.clearance = morph_blanket_depth(b, x);
+    return v;
 }
 
 static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int rounds) {
     for (int round = 0;; round++) {
-        morph_violation v = member_violation(b, x);
-        if (exact)
-            v.clearance = morph_blanket_find_exact(b, x);
-        else
-            v.clearance = morph_blanket_depth(b, x);
+        morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
+        if (exact) v.clearance = morph_blanket_depth_exact(b, x);
         if (held(b, &v) || round == rounds) return v;
-        if (!exact) morph_blanket_find_contacts(b, x);
+        if (exact)
+            morph_blanket_find_exact(b, x);
+        else
+            morph_blanket_find_contacts(b, x);
+        morph_blanket_list_limits(b, x, 0.0, true);
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)
             morph_blanket_sweep(b, x, (sweep & 1) != 0, 0.0);

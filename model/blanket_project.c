@@ -7,6 +7,9 @@
 #define LENGTH_MARGIN 1e-3 /* spacings */
 #define ANGLE_MARGIN 0.01  /* radians */
 
+/* What sweeps may move a joint by beyond its step, spacings: limits closer than that are listed. */
+#define SWEEPS_ADD 0.02
+
 /* Weights of joints that one correction is taken to carry at rest, at most. */
 #define MOST_CARRIED 16.0
 
@@ -37,15 +40,23 @@ static void set_angle(morph_angle *a, const int uj[2], const int vj[2], const do
 
 morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     const morph_structure *s = b->structure;
+    b->bound = morph_alloc((size_t)b->links, sizeof *b->bound);
     b->limit = morph_alloc((size_t)b->links, sizeof *b->limit);
     b->push = morph_alloc((size_t)b->links, sizeof *b->push);
     b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
     b->spare_push = morph_alloc((size_t)b->links, sizeof *b->spare_push);
     b->spare_angle = morph_alloc((size_t)b->angles, sizeof *b->spare_angle);
-    if (!b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle) return MORPH_ERR_NOMEM;
+    b->link_wake = morph_alloc((size_t)b->links, sizeof *b->link_wake);
+    b->near_link = morph_alloc((size_t)b->links, sizeof *b->near_link);
+    b->near_angle = morph_alloc((size_t)b->angles, sizeof *b->near_angle);
+    if (!b->link_wake || !b->near_link || !b->near_angle) return MORPH_ERR_NOMEM;
+    if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
+        return MORPH_ERR_NOMEM;
     for (int l = 0; l < b->links; l++) {
         const double lo = s->length_limit[l][0], hi = s->length_limit[l][1];
         const double margin = fmin(LENGTH_MARGIN * s->spacing, 0.25 * (hi - lo));
+        b->bound[l][0] = lo;
+        b->bound[l][1] = hi;
         b->limit[l][0] = lo + margin;
         b->limit[l][1] = hi - margin;
     }
@@ -58,7 +69,22 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
         morph_link_link_joints(s, t, uj, vj);
         set_angle(&b->angle[n++], uj, vj, s->link_link_limit[t]);
     }
+    for (int t = 0; t < n; t++)
+        for (int k = 0; k < b->angle[t].joints; k++)
+            b->angle[t].weight[k] = b->weight[b->angle[t].joint[k]];
     return MORPH_OK;
+}
+
+/* Moves two joints apart by q d, each by its weight's share; two held ones stay. */
+static void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj, const double d[3],
+                 double q) {
+    const double wi = b->weight[ends[0]], wj = b->weight[ends[1]], sum = wi + wj;
+    if (sum == 0.0) return;
+    const double qi = q * (wi / sum), qj = q * (wj / sum);
+    for (int k = 0; k < 3; k++) {
+        xi[k] -= qi * d[k];
+        xj[k] += qj * d[k];
+    }
 }
 
 /* With e the post before the step and d after the drift, the ends move by -+ q e / 2 so that |d + q e| = h:
@@ -75,10 +101,7 @@ void morph_blanket_project_posts_along(morph_blanket_state *b) {
         const double root = de * de - ee * c;
         if (!(de > 0.0 && root >= 0.0)) continue; /* turned too far in one step: left to the sweeps */
         const double q = -c / (de + sqrt(root));  /* the root near 0, without cancellation */
-        for (int k = 0; k < 3; k++) {
-            xb[k] -= 0.5 * q * e[k];
-            xt[k] += 0.5 * q * e[k];
-        }
+        part(b, s->post[p], xb, xt, e, q);
     }
 }
 
@@ -90,11 +113,7 @@ static void project_posts(const morph_blanket_state *b, double *x) {
         morph_sub(xt, xb, d);
         const double length = morph_norm(d);
         if (!(length > 0.0)) continue;
-        const double q = 0.5 * (s->post_length[p] / length - 1.0);
-        for (int k = 0; k < 3; k++) {
-            xb[k] -= q * d[k];
-            xt[k] += q * d[k];
-        }
+        part(b, s->post[p], xb, xt, d, s->post_length[p] / length - 1.0);
     }
 }
 
@@ -106,14 +125,6 @@ static double unilateral(double *push, double gap) {
     return *push - old;
 }
 
-static void stretch(double *xi, double *xj, const double d[3], double length, double grow) {
-    const double q = 0.5 * grow / length;
-    for (int k = 0; k < 3; k++) {
-        xi[k] -= q * d[k];
-        xj[k] += q * d[k];
-    }
-}
-
 static void project_length(morph_blanket_state *b, int l, double *x) {
     const int *ends = b->structure->link[l];
     double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], d[3];
@@ -122,7 +133,7 @@ static void project_length(morph_blanket_state *b, int l, double *x) {
     if (!(length > 0.0)) return;
     double grow = unilateral(&b->push[l][0], length - b->limit[l][0]);
     if (b->push[l][0] == 0.0) grow -= unilateral(&b->push[l][1], b->limit[l][1] - length);
-    if (grow != 0.0) stretch(xi, xj, d, length, grow);
+    if (grow != 0.0) part(b, ends, xi, xj, d, grow / length);
 }
 
 static void start_length(morph_blanket_state *b, int l, double *x, double warm, double most) {
@@ -133,20 +144,24 @@ static void start_length(morph_blanket_state *b, int l, double *x, double warm, 
     if (push[0] == push[1]) return;
     morph_sub(&x[3 * ends[1]], &x[3 * ends[0]], d);
     const double length = morph_norm(d);
-    if (length > 0.0) stretch(&x[3 * ends[0]], &x[3 * ends[1]], d, length, push[0] - push[1]);
+    if (length > 0.0) part(b, ends, &x[3 * ends[0]], &x[3 * ends[1]], d, (push[0] - push[1]) / length);
 }
 
-/* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
- * su dc/du + sv dc/dv. Returns the sum of the gradients' squares; 0 where the arms are parallel, which the
- * limits keep far from. arm: the shorter arm's length. grad may be
- * NULL, then so may arm, and 0 is returned. */
-static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
-    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+static void arms(const morph_angle *a, const double *x, double u[3], double v[3]) {
     for (int j = 0; j < a->joints; j++)
         for (int k = 0; k < 3; k++) {
             u[k] += a->su[j] * x[3 * a->joint[j] + k];
             v[k] += a->sv[j] * x[3 * a->joint[j] + k];
         }
+}
+
+/* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
+ * su dc/du + sv dc/dv, times its weight. Returns the sum of the gradients' squares; 0 where the arms are
+ * parallel, which the limits keep far from, or all joints are held. arm: the shorter arm's length. grad may
+ * be NULL, then so may arm, and 0 is returned. */
+static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
+    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+    arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
     if (!grad || !(scale > 0.0)) return 0.0;
@@ -154,8 +169,8 @@ static double cosine(const morph_angle *a, const double *x, double *c, double (*
     double square = 0.0;
     for (int j = 0; j < a->joints; j++) {
         for (int k = 0; k < 3; k++)
-            grad[j][k] =
-                a->su[j] * (v[k] / scale - *c * u[k] / uu) + a->sv[j] * (u[k] / scale - *c * v[k] / vv);
+            grad[j][k] = a->weight[j] * (a->su[j] * (v[k] / scale - *c * u[k] / uu) +
+                                         a->sv[j] * (u[k] / scale - *c * v[k] / vv));
         square += morph_dot(grad[j], grad[j]);
     }
     return square * scale > 1e-12 ? square : 0.0;
@@ -165,6 +180,49 @@ double morph_blanket_cosine(const morph_angle *a, const double *x) {
     double c;
     cosine(a, x, &c, NULL, NULL);
     return c;
+}
+
+/* A length changes by at most twice what its joints move. */
+static bool link_near(morph_blanket_state *b, int l, const double *x, double near, bool note) {
+    const int *ends = b->structure->link[l];
+    const double length = morph_dist(&x[3 * ends[0]], &x[3 * ends[1]]);
+    const double spare = 0.5 * fmin(length - b->limit[l][0], b->limit[l][1] - length) - near;
+    if (note && spare > 0.0) b->link_wake[l] = b->path + spare;
+    return !(spare > 0.0);
+}
+
+/* With joints moving by m, arms of length a turn by at most 2 m / (a - 2 m) each and the cosine changes by at
+ * most their sum: it keeps a distance g where m <= g a / (4 + 2 g). */
+static bool angle_near(const morph_blanket_state *b, morph_angle *a, const double *x, double near,
+                       bool note) {
+    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+    arms(a, x, u, v);
+    const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
+    if (!(scale > 0.0)) return true;
+    const double c = morph_dot(u, v) / scale, gap = fmin(a->ceiling - c, c - a->floor);
+    const double spare = gap * sqrt(fmin(uu, vv)) / (4.0 + 2.0 * fmax(gap, 0.0)) - near;
+    if (note && spare > 0.0) a->wake = b->path + spare;
+    return !(spare > 0.0);
+}
+
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all) {
+    const double near = SWEEPS_ADD * b->structure->spacing + move;
+    b->near_links = b->near_angles = 0;
+    for (int l = 0; l < b->links; l++) {
+        if (!all && b->path + near < b->link_wake[l]) continue;
+        if (b->def.drive || link_near(b, l, x, near, !all))
+            b->near_link[b->near_links++] = l;
+        else
+            b->push[l][0] = b->push[l][1] = 0.0;
+    }
+    for (int t = 0; t < b->angles; t++) {
+        morph_angle *a = &b->angle[t];
+        if (!all && b->path + near < a->wake) continue;
+        if (angle_near(b, a, x, near, !all))
+            b->near_angle[b->near_angles++] = t;
+        else
+            a->push[0] = a->push[1] = 0.0;
+    }
 }
 
 static double clip(double value, double most) {
@@ -201,15 +259,64 @@ static void start_angle(morph_angle *a, double *x, double warm, double most) {
     if (square > 0.0) turn(a, x, (const double(*)[3])grad, a->push[0] - a->push[1]);
 }
 
-/* What carries weight moves joints by a few gravity step^2 every step. An impact's corrections are far larger
- * and must not come again in the next step: they would feed the motion. Posts come last: their corrections
- * are not kept, and contacts must not answer before they have. */
+/* Volume of a panel's four corners, six times: det[p, r, d] with the posts p and r and d between their feet.
+ * By a's bottom and top, then b's: grad = -(r x d) - p x r, r x d, -(d x p) + p x r, d x p. */
+static double panel_volume(const morph_structure *s, int panel, const double *x, const double *corner[4],
+                           double grad[4][3]) {
+    const int *a = s->post[s->panel[panel][0]], *b = s->post[s->panel[panel][1]];
+    const int joint[4] = {a[0], a[1], b[0], b[1]};
+    double p[3], r[3], d[3], pr[3], rd[3], dp[3];
+    for (int k = 0; k < 4; k++)
+        corner[k] = &x[3 * joint[k]];
+    morph_sub(corner[1], corner[0], p);
+    morph_sub(corner[3], corner[2], r);
+    morph_sub(corner[2], corner[0], d);
+    morph_cross(p, r, pr);
+    morph_cross(r, d, rd);
+    morph_cross(d, p, dp);
+    for (int k = 0; k < 3; k++) {
+        grad[0][k] = -rd[k] - pr[k];
+        grad[1][k] = rd[k];
+        grad[2][k] = -dp[k] + pr[k];
+        grad[3][k] = dp[k];
+    }
+    return morph_dot(pr, d);
+}
+
+/* Sine of the angle by which a panel is out of plane. */
+double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x) {
+    const double *corner[4];
+    double grad[4][3];
+    const double volume = panel_volume(s, panel, x, corner, grad);
+    const double scale = morph_dist(corner[0], corner[1]) * morph_dist(corner[2], corner[3]) *
+                         morph_dist(corner[0], corner[2]);
+    return scale > 0.0 ? volume / scale : 0.0;
+}
+
+static void project_panel(const morph_blanket_state *b, int panel, double *x) {
+    const morph_structure *s = b->structure;
+    const double *corner[4];
+    double grad[4][3], square = 0.0;
+    const double volume = panel_volume(s, panel, x, corner, grad);
+    for (int k = 0; k < 4; k++)
+        square += b->weight[(corner[k] - x) / 3] * morph_dot(grad[k], grad[k]);
+    if (!(square > 0.0)) return;
+    for (int k = 0; k < 4; k++) {
+        const ptrdiff_t joint = (corner[k] - x) / 3;
+        for (int m = 0; m < 3; m++)
+            x[3 * joint + m] -= volume / square * b->weight[joint] * grad[k][m];
+    }
+}
+
+/* What carries weight moves joints by a few times its acceleration times step^2 every step. An impact's
+ * corrections are far larger and must not come again in the next step: they would feed the motion. Posts come
+ * last: their corrections are not kept, and contacts must not answer before they have. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm) {
-    const double most = MOST_CARRIED * b->def.gravity * b->step * b->step;
-    for (int t = 0; t < b->angles; t++)
-        start_angle(&b->angle[t], x, warm, most);
-    for (int l = 0; l < b->links; l++)
-        start_length(b, l, x, warm, most);
+    const double most = MOST_CARRIED * b->pull * b->step * b->step;
+    for (int t = 0; t < b->near_angles; t++)
+        start_angle(&b->angle[b->near_angle[t]], x, warm, most);
+    for (int l = 0; l < b->near_links; l++)
+        start_length(b, b->near_link[l], x, warm, most);
     morph_blanket_start_contacts(b, x, warm, most);
     project_posts(b, x);
 }
@@ -217,10 +324,13 @@ void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm)
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
  * angles yield where all cannot hold at once. */
 void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction) {
-    for (int t = 0; t < b->angles; t++)
-        project_angle(&b->angle[backward ? b->angles - 1 - t : t], x);
-    for (int l = 0; l < b->links; l++)
-        project_length(b, backward ? b->links - 1 - l : l, x);
+    for (int t = 0; t < b->near_angles; t++)
+        project_angle(&b->angle[b->near_angle[backward ? b->near_angles - 1 - t : t]], x);
+    for (int l = 0; l < b->near_links; l++)
+        project_length(b, b->near_link[backward ? b->near_links - 1 - l : l], x);
+    const int panels = b->structure->panels;
+    for (int p = 0; p < panels; p++)
+        project_panel(b, backward ? panels - 1 - p : p, x);
     for (int c = 0; c < b->contacts; c++)
         morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
     project_posts(b, x);

@@ -4,10 +4,32 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool def_ok(const morph_blanket_def *d) {
-    const double least_zero[] = {d->gravity, d->drag, d->friction, d->time, d->step};
+static bool finite3(const double v[3]) {
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+static bool arrays_ok(const morph_structure *s, const morph_blanket_def *d) {
+    for (int k = 0; k < d->attractor_count; k++)
+        if (!finite3(d->attractors[k].at) || !isfinite(d->attractors[k].strength)) return false;
+    for (int k = 0; k < d->hand_count; k++) {
+        const morph_hand *h = &d->hands[k];
+        if (!finite3(h->force) || h->joint < 0 || h->joint >= s->joints || !(h->from <= h->to)) return false;
+    }
+    for (int k = 0; k < d->fixed_count; k++)
+        if (d->fixed[k] < 0 || d->fixed[k] >= s->joints) return false;
+    if (!d->drive) return true;
+    if (d->drive->samples < 1 || !(d->drive->step > 0.0) || !isfinite(d->drive->step)) return false;
+    for (size_t k = 0; k < (size_t)d->drive->samples * (size_t)s->links; k++)
+        if (!(isfinite(d->drive->length[k]) && d->drive->length[k] > 0.0)) return false;
+    return true;
+}
+
+static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
+    const double least_zero[] = {d->gravity, d->drag, d->friction,  d->time,
+                                 d->step,    d->rise, d->rise_time, d->softening};
     for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
         if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
+    if (!finite3(d->velocity) || (d->rise > 0.0 && !(d->rise_time > 0.0)) || !arrays_ok(s, d)) return false;
     return isfinite(d->frame) && d->frame > 0.0 && (isnan(d->base) || isfinite(d->base));
 }
 
@@ -16,6 +38,11 @@ static morph_status allocate(morph_blanket_state *b) {
     double **const arrays[] = {&b->x, &b->v, &b->a, &b->before, &b->keep_x, &b->keep_v};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         if (!(*arrays[k] = morph_alloc(n, sizeof(double)))) return MORPH_ERR_NOMEM;
+    if (!(b->weight = morph_alloc((size_t)b->joints, sizeof(double)))) return MORPH_ERR_NOMEM;
+    for (int j = 0; j < b->joints; j++)
+        b->weight[j] = 1.0;
+    for (int k = 0; k < b->def.fixed_count; k++)
+        b->weight[b->def.fixed[k]] = 0.0;
     const morph_status status = morph_blanket_limits_create(b);
     return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
 }
@@ -24,7 +51,7 @@ morph_status morph_blanket_state_create(const morph_structure *s, const morph_sd
                                         const morph_blanket_def *def, const double *x0,
                                         morph_blanket_state **out) {
     *out = NULL;
-    if (!def_ok(def)) return MORPH_ERR_INPUT;
+    if (!def_ok(s, def)) return MORPH_ERR_INPUT;
     for (int k = 0; k < 3 * s->joints; k++)
         if (!isfinite(x0[k])) return MORPH_ERR_NONFINITE;
     morph_blanket_state *b = morph_alloc(1, sizeof *b);
@@ -43,7 +70,12 @@ morph_status morph_blanket_state_create(const morph_structure *s, const morph_sd
     }
     memcpy(b->x, x0, 3 * (size_t)b->joints * sizeof(double));
     memcpy(b->before, x0, 3 * (size_t)b->joints * sizeof(double));
-    b->step = def->step > 0.0 ? def->step : morph_blanket_stable_step(s);
+    for (int k = 0; k < 3 * b->joints; k++)
+        b->v[k] = b->weight[k / 3] * def->velocity[k % 3];
+    b->step = def->step > 0.0 ? def->step : fmin(morph_blanket_stable_step(s, def), def->frame);
+    b->most_move = INFINITY;
+    b->pull = morph_blanket_pull(s, def);
+    b->lift = b->lift_to = morph_blanket_lift(def, 0.0);
     morph_blanket_accelerations(b);
     *out = b;
     return MORPH_OK;
@@ -54,9 +86,15 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         free(arrays[k]);
+    free(b->weight);
+    free(b->bound);
     free(b->limit);
+    free(b->link_wake);
+    free(b->near_link);
+    free(b->near_angle);
     free(b->push);
     free(b->angle);
+    free(b->memo);
     free(b->touch);
     free(b->contact);
     free(b->hold);

@@ -32,7 +32,7 @@ says 'cannot be written: No space left on device'
 absent disk box.plan
 
 # An old plan survives a new one that has no room.
-mount -o remount,size=20m "$mounted"
+mount -o remount,size=40m "$mounted"
 run "$program" plan "$scene" --method blanket -o disk/box.plan
 holds "room for one plan" [ -e disk/box.plan/report.html ]
 fingerprint disk/box.plan >"$work/before"
