@@ -3,6 +3,7 @@
 #define MORPH_SCENE_H
 
 #include "model/attraction.h"
+#include "model/blanket.h"
 #include "model/mesh.h"
 #include "model/structure.h"
 
@@ -50,13 +51,6 @@ typedef struct morph_motion_def {
  */
 typedef enum morph_attractors { MORPH_ATTRACT_AUTO, MORPH_ATTRACT_NONE, MORPH_ATTRACT_LIST } morph_attractors;
 
-/* The force of a user's hand on one joint, from <= t < to. */
-typedef struct morph_scene_touch {
-    int joint;       /* of the structure */
-    double force[3]; /* N */
-    double from, to; /* s */
-} morph_scene_touch;
-
 typedef struct morph_scene {
     char *file; /* path of the scene */
     char *title;
@@ -70,10 +64,10 @@ typedef struct morph_scene {
     double sample;     /* s */
     morph_mesh target; /* built, in world coordinates, mended */
     morph_mesh_report target_report;
-    int touches, centres;     /* as the scene lists them; 0 else */
-    morph_scene_touch *touch; /* touches */
-    morph_attractor *centre;  /* centres, of MORPH_ATTRACT_LIST */
-    int (*fixed_node)[2]; /* structure.fixed_nodes: structure.fixed as a list of nodes (i, j), each once */
+    int touches, centres;    /* as the scene lists them; 0 else */
+    morph_hand *touch;       /* touches */
+    morph_attractor *centre; /* centres, of MORPH_ATTRACT_LIST */
+    int (*fixed_node)[2];    /* structure.fixed_nodes: structure.fixed as a list of nodes (i, j), each once */
 } morph_scene;
 
 /* Where faults go: one line each, "FILE:LINE: key: what is wrong, what is allowed". */

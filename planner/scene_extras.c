@@ -34,7 +34,7 @@ static morph_value entry(const morph_value *list, int i, const char *allowed) {
 }
 
 /* A time window that is one. */
-static void read_window(const morph_value *touch, morph_scene_touch *out) {
+static void read_window(const morph_value *touch, morph_hand *out) {
     const morph_value begin = required(touch, "from", "a time in s"),
                       end = required(touch, "to", "a time in s");
     const bool timed = morph_value_number(&begin, &moment_range, &out->from) == MORPH_FOUND;
@@ -46,7 +46,7 @@ static void read_window(const morph_value *touch, morph_scene_touch *out) {
     morph_value_fault(&end, "%s is not after from, allowed: more than %s s", a, b);
 }
 
-static void read_touch_entry(const morph_scene_reader *r, const morph_value *touch, morph_scene_touch *out) {
+static void read_touch_entry(const morph_scene_reader *r, const morph_value *touch, morph_hand *out) {
     static const char *const layers[2] = {"bottom", "top"};
     const morph_structure_def *def = &r->scene->structure;
     long node[2];

@@ -160,6 +160,37 @@ static void read_later_link_keys(morph_scene_reader *r, const morph_value *link)
         morph_value_later(&stuck, "links that hold their start length");
 }
 
+/* Least distance of two links' axes at the flat start, with s the spacing and h the thickness. Parallel links
+ * of a layer s, of a panel h. Web: a brace and a link or post across its panel's corner, the legs s and h
+ * apart: the altitude h s / sqrt(s^2 + h^2). Full: a web and a cell's diagonal, both from edges of a cell's
+ * box: with the diagonal's s/sqrt 2 as the other leg h s / sqrt(s^2 + 2 h^2). Offset: links that cross h
+ * apart, and the parallel webs of neighbouring joints, s/sqrt 2. */
+static double start_room(const morph_structure_def *def) {
+    const double s = def->spacing, h = def->thickness;
+    if (def->layout == MORPH_LAYOUT_OFFSET) return fmin(h, s / sqrt(2.0));
+    if (def->bracing == MORPH_BRACING_WEB) return h * s / hypot(s, h);
+    if (def->bracing == MORPH_BRACING_FULL) return h * s / hypot(s, sqrt(2.0) * h);
+    return fmin(h, s);
+}
+
+/* Links must not touch at the flat start. */
+static void check_room(const morph_scene_reader *r, const morph_value *structure, const morph_value *link) {
+    const morph_structure_def *def = &r->scene->structure;
+    const double room = start_room(def);
+    if (!r->spacing_known || 2.0 * def->radius < room) return;
+    const char *what = room == def->thickness ? "thickness"
+                       : room == def->spacing ? "spacing"
+                                              : "distance of braces";
+    morph_value at = morph_value_get(link, "radius");
+    if (!at.node) at = morph_value_get(structure, def->thickness < def->spacing ? "thickness" : "spacing");
+    char radius[MORPH_NUMBER_TEXT], half[MORPH_NUMBER_TEXT];
+    morph_number_print(def->radius, radius);
+    morph_number_print(0.5 * room, half);
+    morph_value_fault(&at,
+                      "links of radius %s touch at the start, allowed: a radius below half the %s (%s m)",
+                      radius, what, half);
+}
+
 static void read_link(morph_scene_reader *r, const morph_value *structure) {
     const morph_value link = morph_scene_section(structure, "link");
     morph_structure_def *def = &r->scene->structure;
@@ -172,18 +203,7 @@ static void read_link(morph_scene_reader *r, const morph_value *structure) {
     read_number(&link, "damping", &damping_range, &def->damping);
     read_later_link_keys(r, &link);
 
-    /* Neighbouring parallel links, and the two links of a panel, must not touch at the flat start. */
-    const bool by_height = def->thickness < def->spacing;
-    const double room = by_height ? def->thickness : def->spacing;
-    if (!r->spacing_known || 2.0 * def->radius < room) return;
-    morph_value at = morph_value_get(&link, "radius");
-    if (!at.node) at = morph_value_get(structure, by_height ? "thickness" : "spacing");
-    char radius[MORPH_NUMBER_TEXT], half[MORPH_NUMBER_TEXT];
-    morph_number_print(def->radius, radius);
-    morph_number_print(0.5 * room, half);
-    morph_value_fault(&at,
-                      "links of radius %s touch at the start, allowed: a radius below half the %s (%s m)",
-                      radius, by_height ? "thickness" : "spacing", half);
+    check_room(r, structure, &link);
 }
 
 /* Limits in degrees to radians; the flat start has 90 degrees everywhere. */

@@ -180,7 +180,7 @@ static bool put_target(buffer *b, const morph_target_def *def, const char *file)
 static void put_touch(buffer *b, const morph_scene *scene) {
     put(b, scene->touches > 0 ? "  touch:\n" : "  touch: []\n");
     for (int k = 0; k < scene->touches; k++) {
-        const morph_scene_touch *t = &scene->touch[k];
+        const morph_hand *t = &scene->touch[k];
         int layer, node[2];
         morph_joint_place(&scene->structure, t->joint, &layer, node);
         put(b, "    - node: [%d, %d]\n", node[0], node[1]);

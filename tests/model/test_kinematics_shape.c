@@ -210,7 +210,6 @@ static void test_repeats(void **state) {
     (void)state;
     morph_structure *s = make(4, MORPH_LAYOUT_POSTS, MORPH_JOINTS_BALL, MORPH_BRACING_WEB);
     double meant[MOST], a[MOST], b[MOST], lengths[MOST_LINKS];
-    morph_blas_threads(1);
     bend(s, SADDLE, radius_for(4), meant);
     morph_link_lengths(s, meant, lengths);
     assert_int_equal(morph_shape_from_lengths(s, lengths, s->start, a, NULL), MORPH_OK);
@@ -255,6 +254,7 @@ static void test_alignment(void **state) {
 }
 
 int main(void) {
+    morph_blas_threads(1); /* sums repeat bit for bit */
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_recovered), cmocka_unit_test(test_left_free),
         cmocka_unit_test(test_offset),    cmocka_unit_test(test_panels),

@@ -50,7 +50,7 @@ static void assert_same_features(const morph_scene *a, const morph_scene *b) {
     assert_memory_equal(&a->motion, &b->motion, sizeof a->motion);
     assert_int_equal(a->touches, b->touches);
     for (int k = 0; k < a->touches; k++) {
-        const morph_scene_touch *t = &a->touch[k], *u = &b->touch[k];
+        const morph_hand *t = &a->touch[k], *u = &b->touch[k];
         assert_int_equal(t->joint, u->joint);
         assert_memory_equal(t->force, u->force, sizeof t->force);
         assert_true(t->from == u->from && t->to == u->to);
@@ -163,7 +163,7 @@ static void test_touch(void **state) {
     for (int layout = 0; layout < 2; layout++) {
         morph_scene *scene = scene_with(layout ? ", layout: offset" : "", hands);
         assert_int_equal(scene->touches, 2);
-        const morph_scene_touch *t = scene->touch;
+        const morph_hand *t = scene->touch;
         morph_structure *s = build(scene);
         assert_int_equal(s->joint_layer[t[0].joint], 1);
         assert_int_equal(s->joint_node[t[0].joint][0], 1);
@@ -241,6 +241,64 @@ static void test_short_numbers(void **state) {
     }
 }
 
+/* Distance of two segments: bisected search on a grid that shrinks around its best point (the function is
+ * convex, so the best cell is next to it). */
+static double segments_apart(const double *x, const int a[2], const int b[2]) {
+    double best = INFINITY, at[2] = {0.5, 0.5};
+    for (double width = 0.5; width > 1e-9; width *= 0.6) {
+        const double middle[2] = {at[0], at[1]};
+        for (int n = 0; n < 81; n++) {
+            const double s = fmin(fmax(middle[0] + width * (n % 9 - 4) / 4.0, 0.0), 1.0);
+            const double t = fmin(fmax(middle[1] + width * (n / 9 - 4) / 4.0, 0.0), 1.0);
+            double p[3], q[3];
+            for (int k = 0; k < 3; k++) {
+                p[k] = (1.0 - s) * x[3 * a[0] + k] + s * x[3 * a[1] + k];
+                q[k] = (1.0 - t) * x[3 * b[0] + k] + t * x[3 * b[1] + k];
+            }
+            if (morph_dist(p, q) >= best) continue;
+            best = morph_dist(p, q);
+            at[0] = s, at[1] = t;
+        }
+    }
+    return best;
+}
+
+/* The largest radius that the reader takes is half of what the axes measure apart. */
+static void test_room(void **state) {
+    (void)state;
+    static const char *const layouts[] = {"layout: posts", "bracing: web", "bracing: full", "layout: offset"};
+    static const double thickness[] = {0.02, 0.05, 0.1, 0.2};
+    for (int k = 0; k < 16; k++) {
+        morph_structure_def def = morph_structure_defaults(0.1);
+        def.nodes[0] = def.nodes[1] = 3;
+        def.thickness = thickness[k / 4];
+        def.layout = k % 4 == 3 ? MORPH_LAYOUT_OFFSET : MORPH_LAYOUT_POSTS;
+        def.bracing = k % 4 == 1 ? MORPH_BRACING_WEB : k % 4 == 2 ? MORPH_BRACING_FULL : MORPH_BRACING_NONE;
+        morph_structure *s;
+        assert_int_equal(morph_structure_create(&def, &s), MORPH_OK);
+        double least = INFINITY;
+        for (int a = 0; a < s->links; a++)
+            for (int b = 0; b < a; b++) {
+                const int *p = s->link[a], *q = s->link[b];
+                if (p[0] != q[0] && p[0] != q[1] && p[1] != q[0] && p[1] != q[1])
+                    least = fmin(least, segments_apart(s->start, p, q));
+            }
+        morph_structure_destroy(s);
+        for (int above = 0; above < 2; above++) {
+            char text[400];
+            morph_scene *scene;
+            snprintf(
+                text, sizeof text,
+                "morphplan: 1\nstructure: {nodes: [3, 3], spacing: 0.1, thickness: %g, %s, link: {radius: "
+                "%.9g}}\nmotion: {height: 1}\ntarget: {shape: box, size: [0.1, 0.1, 0.1]}\n",
+                def.thickness, layouts[k % 4], 0.5 * least * (above ? 1.00001 : 0.99999));
+            assert_int_equal(morph_scene_parse("s.yaml", text, strlen(text), NULL, NULL, NULL, &scene),
+                             above ? MORPH_ERR_INPUT : MORPH_OK);
+            morph_scene_destroy(scene);
+        }
+    }
+}
+
 static void test_supported(void **state) {
     (void)state;
     static const struct {
@@ -279,6 +337,7 @@ int main(void) {
         cmocka_unit_test(test_long_list),     cmocka_unit_test(test_touch),
         cmocka_unit_test(test_attractors),    cmocka_unit_test(test_rise_and_deformable),
         cmocka_unit_test(test_short_numbers), cmocka_unit_test(test_supported),
+        cmocka_unit_test(test_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
