@@ -3,12 +3,28 @@
 #include <stdlib.h>
 #include <string.h>
 
+int morph_pose_width(const morph_structure *s) {
+    return s->posts > 0 ? 6 * s->posts : 3 * s->joints;
+}
+
+/* x: 3*joints; y: a pose. */
+static void set_pose(const morph_structure *s, const double *x, double *y) {
+    if (s->posts == 0) memcpy(y, x, 3 * (size_t)s->joints * sizeof *y);
+    for (int p = 0; p < s->posts; p++, y += 6) {
+        const double *b = &x[3 * s->post[p][0]], *t = &x[3 * s->post[p][1]], h = morph_dist(b, t);
+        for (int m = 0; m < 3; m++) {
+            y[m] = 0.5 * (b[m] + t[m]);
+            y[3 + m] = (t[m] - b[m]) / h;
+        }
+    }
+}
+
 morph_status morph_curve_create(const morph_structure *s, const double *parameter, const double *joints,
                                 int poses, morph_curve **out) {
     *out = NULL;
     morph_curve *c = calloc(1, sizeof *c);
     if (!c) return MORPH_ERR_NOMEM;
-    const int width = 6 * s->posts;
+    const int width = morph_pose_width(s);
     c->structure = s;
     c->poses = poses;
     c->s = morph_alloc((size_t)poses, sizeof(double));
@@ -17,15 +33,7 @@ morph_status morph_curve_create(const morph_structure *s, const double *paramete
     if (status == MORPH_OK) {
         memcpy(c->s, parameter, (size_t)poses * sizeof *c->s);
         for (int k = 0; k < poses; k++)
-            for (int p = 0; p < s->posts; p++) {
-                const double *x = &joints[(size_t)k * 3 * (size_t)s->joints];
-                const double *b = &x[3 * s->post[p][0]], *t = &x[3 * s->post[p][1]], h = morph_dist(b, t);
-                double *y = &c->pose[(size_t)k * (size_t)width + 6 * (size_t)p];
-                for (int m = 0; m < 3; m++) {
-                    y[m] = 0.5 * (b[m] + t[m]);
-                    y[3 + m] = (t[m] - b[m]) / h;
-                }
-            }
+            set_pose(s, &joints[(size_t)k * 3 * (size_t)s->joints], &c->pose[(size_t)k * (size_t)width]);
         status = morph_spline_fit(c->s, c->pose, poses, width, &c->spline);
     }
     if (status != MORPH_OK) {
@@ -40,8 +48,18 @@ void morph_curve_destroy(morph_curve *c) {
     if (!c) return;
     free(c->s);
     free(c->pose);
+    free(c->lift);
     morph_spline_free(&c->spline);
     free(c);
+}
+
+double morph_curve_lift(const morph_curve *c, double s) {
+    int k = 0;
+    if (!c->lift) return 0.0;
+    while (k + 2 < c->poses && s > c->s[k + 1])
+        k++;
+    const double t = fmax(0.0, fmin(1.0, (s - c->s[k]) / (c->s[k + 1] - c->s[k])));
+    return c->lift[k] + t * (c->lift[k + 1] - c->lift[k]);
 }
 
 /* Truncated Taylor arithmetic: coefficient k of a jet is the k-th derivative over k!. */
@@ -79,7 +97,11 @@ static void jet_divide(const double *a, const double *b, int order, double *q) {
 
 void morph_curve_joints(const morph_curve *curve, double s, int order, double *scratch, double *out) {
     const morph_structure *st = curve->structure;
-    const size_t width = 6 * (size_t)st->posts, coordinates = 3 * (size_t)st->joints;
+    const size_t width = (size_t)morph_pose_width(st), coordinates = 3 * (size_t)st->joints;
+    if (st->posts == 0) {
+        morph_spline_eval(&curve->spline, s, order, out);
+        return;
+    }
     morph_spline_eval(&curve->spline, s, order, scratch);
     for (int p = 0; p < st->posts; p++) {
         double q[3][MORPH_JET], square[MORPH_JET], norm[MORPH_JET];

@@ -29,6 +29,8 @@ typedef struct pather {
     double *x;      /* capacity x coordinates, scaled */
     double *inset;  /* capacity: extra factor on the inset of a pose */
     double *metres; /* capacity x coordinates */
+    double *lift;   /* capacity: the target above its place, m */
+    bool rises;
     morph_active *active;
     double started;
 } pather;
@@ -79,6 +81,8 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
             pose(p, k)[i] = at / a;
         }
         p->inset[k] = 1.0;
+        p->lift[k] = guide->lift ? guide->lift[at_frame] : 0.0;
+        p->rises = p->rises || p->lift[k] != 0.0;
     }
 }
 
@@ -128,7 +132,12 @@ static morph_status draw_curve(pather *p, morph_curve **out) {
     for (size_t i = 0; i < all; i++)
         p->metres[i] = p->x[i] * a;
     morph_curve_destroy(*out);
-    return morph_curve_create(p->world->structure, p->s, p->metres, p->count, out);
+    const morph_status status = morph_curve_create(p->world->structure, p->s, p->metres, p->count, out);
+    if (status != MORPH_OK || !p->rises) return status;
+    (*out)->lift = morph_alloc((size_t)p->count, sizeof(double));
+    if (!(*out)->lift) return MORPH_ERR_NOMEM;
+    memcpy((*out)->lift, p->lift, (size_t)p->count * sizeof(double));
+    return MORPH_OK;
 }
 
 typedef struct breach {
@@ -139,7 +148,7 @@ typedef struct breach {
 /* Examines the curve between poses: the worst breach of every interval, and the worst violation of all. */
 static morph_status examine_curve(pather *p, const morph_curve *curve, breach *breaches) {
     const morph_structure *st = p->world->structure;
-    double *scratch = morph_alloc(6 * (size_t)st->posts, sizeof(double));
+    double *scratch = morph_alloc((size_t)morph_pose_width(st), sizeof(double));
     double *x = morph_alloc((size_t)p->coordinates, sizeof(double));
     morph_status status = scratch && x ? MORPH_OK : MORPH_ERR_NOMEM;
     morph_path_report *r = p->report;
@@ -197,7 +206,7 @@ static morph_status insert_pose(pather *p, const morph_curve *curve, int k, doub
     p->count++;
     p->s[k + 1] = s;
     p->inset[k + 1] = 0.5 * (p->inset[k] + p->inset[k + 2]);
-    double *scratch = morph_alloc(6 * (size_t)p->world->structure->posts, sizeof(double));
+    double *scratch = morph_alloc((size_t)morph_pose_width(p->world->structure), sizeof(double));
     if (!scratch) return MORPH_ERR_NOMEM;
     morph_curve_joints(curve, s, 0, scratch, pose(p, k + 1));
     free(scratch);
@@ -344,7 +353,8 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     p.x = morph_alloc(rows * width, sizeof(double));
     p.inset = morph_alloc(rows, sizeof(double));
     p.metres = morph_alloc(rows * width, sizeof(double));
-    morph_status status = p.s && p.x && p.inset && p.metres ? MORPH_OK : MORPH_ERR_NOMEM;
+    p.lift = morph_alloc(rows, sizeof(double));
+    morph_status status = p.lift && p.s && p.x && p.inset && p.metres ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) status = morph_active_create(world->structure, &p.active);
     if (status == MORPH_OK) {
         if (options->stations > 0)
@@ -359,6 +369,7 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
     free(p.x);
     free(p.inset);
     free(p.metres);
+    free(p.lift);
     morph_active_destroy(p.active);
     return status;
 }

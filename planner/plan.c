@@ -46,10 +46,46 @@ static morph_status stage_target(planner *p) {
     return status;
 }
 
+/* Measures where the target stands: the pose is seen from there. */
+static morph_status measure_lifted(const planner *p, const double *x, double lift, morph_measure *out) {
+    const int n = 3 * p->work.structure->joints;
+    double *seen = morph_alloc((size_t)n, sizeof(double));
+    if (!seen) return MORPH_ERR_NOMEM;
+    for (int i = 0; i < n; i++)
+        seen[i] = x[i] - (i % 3 == 2 ? lift : 0.0);
+    const morph_status status = morph_cavity_measure(p->work.cavity, seen, out);
+    free(seen);
+    return status;
+}
+
+/* Says what stood against a rising target. */
+static void note_held_up(planner *p) {
+    static const char *const limits[] = {"length", "angle", "post", "panel", "clearance"};
+    const morph_structure *st = p->work.structure;
+    const morph_blanket_report *r = &p->plan->summary.blanket_report;
+    char element[96] = "", *text = p->plan->summary.warning;
+    if (r->held_by == MORPH_BLANKET_LENGTH && r->held_element >= 0) {
+        snprintf(element, sizeof element, " of ");
+        morph_link_name(st, r->held_element, element + 4, sizeof element - 4);
+    } else if (r->held_by == MORPH_BLANKET_ANGLE && r->held_element >= 0) {
+        const bool post = r->held_element < st->link_posts;
+        const int tuple = post ? r->held_element : r->held_element - st->link_posts;
+        snprintf(element, sizeof element, " %s of ", post ? "to the post" : "to its neighbour");
+        const size_t used = strlen(element);
+        morph_link_name(st, post ? st->link_post[tuple][0] : st->link_link[tuple][0], element + used,
+                        sizeof element - used);
+    }
+    snprintf(
+        text, sizeof p->plan->summary.warning,
+        "the target stopped rising at %.2f s, %.4g m short of its place: the %s limit%s stood against it",
+        r->held_time, r->short_of, limits[r->held_by], element);
+    morph_log(control_of(p), "nominal: %s", text);
+}
+
 static morph_status stage_nominal(planner *p) {
     const double since = morph_seconds();
     const morph_structure *st = p->work.structure;
-    const morph_blanket_def def = morph_scene_blanket(p->scene);
+    const morph_blanket_def def = morph_scene_blanket(p->scene, st);
     morph_summary *s = &p->plan->summary;
     morph_status status = morph_blanket_run(st, p->work.sdf, p->work.exact, &def, p->work.start,
                                             control_of(p), &p->nominal, &s->blanket_report);
@@ -64,9 +100,10 @@ static morph_status stage_nominal(planner *p) {
         p->end = morph_alloc(width, sizeof(double));
         if (!p->end) return MORPH_ERR_NOMEM;
         memcpy(p->end, last, width * sizeof *last);
-        status = morph_cavity_measure(p->work.cavity, last, &s->blanket);
+        status = measure_lifted(p, last, p->nominal.lift[p->nominal.frames - 1], &s->blanket);
         s->has_blanket = status == MORPH_OK;
     }
+    if (status == MORPH_OK && s->blanket_report.held_up) note_held_up(p);
     note_time(p, MORPH_STAGE_NOMINAL, since);
     return status;
 }
@@ -223,8 +260,8 @@ static morph_status stage_measure(planner *p) {
     morph_summary *s = &p->plan->summary;
     const size_t width = 3 * (size_t)p->work.structure->joints;
     morph_progress(control_of(p), "measure", 0.0);
-    morph_status status =
-        morph_cavity_measure(p->work.cavity, &r->schedule_joints[(size_t)(r->samples - 1) * width], &s->plan);
+    morph_status status = measure_lifted(p, &r->schedule_joints[(size_t)(r->samples - 1) * width],
+                                         r->offset_schedule[3 * (size_t)(r->samples - 1) + 2], &s->plan);
     s->has_plan = status == MORPH_OK;
     if (status == MORPH_OK) status = morph_record_mobility(r, p->work.structure);
     if (status == MORPH_OK) {

@@ -33,13 +33,14 @@ typedef struct morph_workspace {
     morph_sdf *sdf;
     morph_cavity *cavity;
     morph_world world;
-    double *start; /* 3*joints: flat, at the drop height above the target */
+    double *start; /* 3*joints: flat, at the drop height above the target or in its frame */
     morph_sdf_accuracy accuracy;
 } morph_workspace;
 morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,
                                     morph_workspace *out);
 void morph_workspace_free(morph_workspace *w);
-morph_blanket_def morph_scene_blanket(const morph_scene *scene);
+/* What drives the pure blanket; points into scene and structure. */
+morph_blanket_def morph_scene_blanket(const morph_scene *scene, const morph_structure *structure);
 
 /* Copies the structure and target into the record, and a curve with its timing as samples. */
 morph_status morph_record_structure(morph_record *r, const morph_structure *s, const morph_mesh *target,

@@ -40,8 +40,8 @@ typedef struct morph_record {
     int nominal_frames;
     double *nominal_time, *nominal_joints, *nominal_lengths;
     /* path/ */
-    int poses;
-    double *path_s, *path_poses; /* poses; poses x 6*posts (centre, direction) */
+    int poses, pose_width;       /* 6*posts, or 3*joints without posts */
+    double *path_s, *path_poses; /* poses; poses x pose_width (centre and direction per post) */
     /* schedule/ */
     int samples;
     double *time, *schedule_joints, *length, *rate, *acceleration;

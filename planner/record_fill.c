@@ -66,6 +66,7 @@ morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, co
     const size_t width = 3 * (size_t)s->joints, links = (size_t)s->links;
     const int samples = (int)lround(timing->duration / sample) + 1;
     r->poses = curve->poses;
+    r->pose_width = morph_pose_width(s);
     r->samples = samples;
     r->time = morph_alloc((size_t)samples, sizeof(double));
     r->schedule_joints = morph_alloc((size_t)samples, width * sizeof(double));
@@ -73,11 +74,11 @@ morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, co
     r->rate = morph_alloc((size_t)samples, links * sizeof(double));
     r->acceleration = morph_alloc((size_t)samples, links * sizeof(double));
     r->offset_schedule = morph_alloc((size_t)samples, 3 * sizeof(double));
-    double *scratch = morph_alloc(4 * 6 * (size_t)s->posts, sizeof(double));
+    double *scratch = morph_alloc(4 * (size_t)r->pose_width, sizeof(double));
     double *joints = morph_alloc(4 * width, sizeof(double));
     double *by_s = morph_alloc(4 * links, sizeof(double)), *by_t = morph_alloc(4 * links, sizeof(double));
     const bool ok = COPY(r->path_s, curve->s, curve->poses) &&
-                    COPY(r->path_poses, curve->pose, (size_t)curve->poses * 6 * (size_t)s->posts) &&
+                    COPY(r->path_poses, curve->pose, (size_t)curve->poses * (size_t)r->pose_width) &&
                     r->time && r->schedule_joints && r->length && r->rate && r->acceleration &&
                     r->offset_schedule && scratch && joints && by_s && by_t;
     for (int i = 0; i < samples && ok; i++) {
@@ -85,6 +86,7 @@ morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, co
         /* Even times as products: a running sum would drift. */
         r->time[i] = i * sample;
         morph_timing_eval(timing, fmin(r->time[i], timing->duration), at);
+        r->offset_schedule[3 * (size_t)i + 2] = morph_curve_lift(curve, at[0]);
         morph_curve_joints(curve, at[0], 3, scratch, joints);
         morph_curve_lengths(s, joints, 3, by_s);
         morph_timing_chain(s->links, by_s, at, by_t);

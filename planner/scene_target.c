@@ -234,6 +234,17 @@ static void check_place(const morph_scene_reader *r, const morph_value *at) {
         morph_number_print(scene->base, base);
         morph_value_fault(at, "the target ends at height %s, below the base, allowed: above %s", top, base);
     }
+    /* The rising target starts below the blanket in its frame. */
+    if (scene->motion.mode == MORPH_MODE_RISE && !isnan(scene->base) &&
+        report->hi[2] - scene->motion.height > scene->base) {
+        morph_number_print(scene->motion.height, top);
+        morph_number_print(report->hi[2] - scene->base, base);
+        morph_value_fault(
+            at,
+            "the target's top starts above the base when it rises by motion.height %s, allowed: "
+            "a motion.height of at least %s",
+            top, base);
+    }
     if (!r->spacing_known || !r->nodes_known) return;
     for (int k = 0; k < 2; k++) {
         const double half = 0.5 * (def->nodes[k] - 1) * def->spacing;

@@ -6,7 +6,7 @@
 morph_status morph_path_table_create(const morph_curve *curve, morph_path_table *out) {
     const morph_structure *s = curve->structure;
     *out = (morph_path_table){.curve = curve};
-    out->scratch = morph_alloc(MORPH_JET * 6 * (size_t)s->posts, sizeof(double));
+    out->scratch = morph_alloc(MORPH_JET * (size_t)morph_pose_width(s), sizeof(double));
     out->joints = morph_alloc(MORPH_JET * 3 * (size_t)s->joints, sizeof(double));
     out->exact = morph_alloc(MORPH_JET * (size_t)s->links, sizeof(double));
     out->by_time = morph_alloc(4 * (size_t)s->links, sizeof(double));

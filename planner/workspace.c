@@ -20,6 +20,15 @@ static void field_box(const morph_scene *scene, const morph_structure *s, const 
     if (!isnan(scene->base)) lo[2] = fmax(lo[2], scene->base - 0.5 * a);
 }
 
+/* Of the bottom layer. Dropped, it starts above the target, and never in the base plane: with a target below
+ * that the plane counts as the top. Where the target rises, it starts in the frame that holds it: on the base
+ * plane, or without one where the target's top begins, by a radius and a contact's margin above either. */
+static double start_height(const morph_scene *scene) {
+    const double top = scene->target_report.hi[2], base = isnan(scene->base) ? -INFINITY : scene->base;
+    if (scene->motion.mode == MORPH_MODE_DROP) return fmax(top, base) + scene->motion.height;
+    return fmax(top - scene->motion.height, base) + scene->structure.radius + 2e-3 * scene->structure.spacing;
+}
+
 morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,
                                     morph_workspace *w) {
     *w = (morph_workspace){0};
@@ -31,10 +40,7 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
         status = MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
         double lo[3], hi[3];
-        /* The structure never starts in the base plane: with a target below it the plane counts as the top.
-         */
-        const double base = isnan(scene->base) ? -INFINITY : scene->base;
-        const double height = fmax(scene->target_report.hi[2], base) + scene->motion.height;
+        const double height = start_height(scene);
         for (int i = 0; i < 3 * s->joints; i++)
             w->start[i] = s->start[i] + (i % 3 == 2 ? height : 0.0);
         field_box(scene, s, w->start, lo, hi);
@@ -65,11 +71,24 @@ void morph_workspace_free(morph_workspace *w) {
     *w = (morph_workspace){0};
 }
 
-morph_blanket_def morph_scene_blanket(const morph_scene *scene) {
+/* Part of the time that the target's rise takes; the rest is for coming to rest. */
+#define RISE_TIME 0.6
+
+morph_blanket_def morph_scene_blanket(const morph_scene *scene, const morph_structure *structure) {
+    const bool rises = scene->motion.mode == MORPH_MODE_RISE;
     return (morph_blanket_def){.gravity = scene->motion.gravity,
                                .drag = scene->motion.drag,
                                .friction = scene->motion.friction,
                                .time = scene->motion.time,
                                .frame = 0.01,
-                               .base = scene->base};
+                               .base = scene->base,
+                               .attractors = scene->centre,
+                               .attractor_count =
+                                   scene->attractors == MORPH_ATTRACT_LIST ? scene->centres : 0,
+                               .hands = scene->touch,
+                               .hand_count = scene->touches,
+                               .fixed = structure->fixed_joint,
+                               .fixed_count = structure->fixed_joints,
+                               .rise = rises ? scene->motion.height : 0.0,
+                               .rise_time = RISE_TIME * scene->motion.time};
 }

@@ -194,7 +194,7 @@ static void measure_round(round_one *r, const double *start) {
 static void first_round(const morph_scene *scene) {
     morph_workspace w;
     if (morph_workspace_create(scene, NULL, &w) != MORPH_OK) return;
-    const morph_blanket_def def = morph_scene_blanket(scene);
+    const morph_blanket_def def = morph_scene_blanket(scene, w.structure);
     morph_trajectory t = {0};
     round_one r = {0};
     if (morph_blanket_run(w.structure, w.sdf, w.exact, &def, w.start, NULL, &t, NULL) == MORPH_OK &&

@@ -305,7 +305,7 @@ static void test_workspace(void **state) {
     assert_true(fabs(lowest - 0.16) < 1e-12);
     assert_true(w.accuracy.max < 0.1 * scene->structure.spacing && w.accuracy.rms <= w.accuracy.max);
     assert_ptr_equal(w.world.structure, w.structure);
-    const morph_blanket_def def = morph_scene_blanket(scene);
+    const morph_blanket_def def = morph_scene_blanket(scene, w.structure);
     assert_true(def.time == 0.5 && def.friction == 0.4 && def.base == scene->base);
     morph_workspace_free(&w);
     assert_null(w.structure);
