@@ -94,7 +94,7 @@ static morph_status newton(morph_settle *s, double target, bool *good) {
             most = fmax(most, morph_norm(&s->d[3 * j]));
         }
         const bool found = search(s, energy, slope, most > MOST_NEWTON ? MOST_NEWTON / most : 1.0);
-        if (!found || most > 10.0 * MOST_NEWTON) s->drag = fmin(10.0 * s->drag, 1e6);
+        if (!found || most > 10.0 * MOST_NEWTON) s->drag = fmin(4.0 * s->drag, 1e6);
     }
 }
 
@@ -174,7 +174,10 @@ static morph_status run(morph_settle *s, const morph_control *control, morph_set
             kick(s, r->saddles++);
             r->converged = false;
         }
-        if (r->steps > 0) next_drag(s, good, move, r->residual, last);
+        if (r->steps > 0)
+            next_drag(s, good, move, r->residual, last);
+        else /* a start close to rest, as a warm one, need not creep there */
+            s->drag = fmin(FIRST_DRAG, fmax(LEAST_DRAG, FIRST_DRAG * r->residual));
         last = r->residual;
         const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
         if (status != MORPH_OK) return status;
