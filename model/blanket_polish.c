@@ -7,6 +7,9 @@
  * its limits (the sweeps aim inside), so most need no round or one. */
 #define ROUNDS 24
 #define SWEEPS 8
+/* From then on a round must take this part off what is left, or the polishing ends. */
+#define LEAST_ROUNDS 4
+#define BETTER 0.9
 /* Rounds with contact by exact distances, which cost a tree search per element. */
 #define EXACT_ROUNDS 6
 /* Of lengths, posts, panels and angles at x. */
@@ -50,10 +53,16 @@ morph_violation morph_blanket_violation(const morph_blanket_state *b, const doub
 }
 
 static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int rounds) {
+    double before = INFINITY;
     for (int round = 0;; round++) {
         morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
         if (exact) v.clearance = morph_blanket_depth_exact(b, x);
         if (held(b, &v) || round == rounds) return v;
+        /* What does not get better cannot be met: contradicting lengths, a target in the way of a limit. */
+        const double spacing = b->structure->spacing;
+        const double worst = (v.length + v.clearance) / spacing + v.post + v.panel;
+        if (round >= LEAST_ROUNDS && worst > BETTER * before) return v;
+        before = worst;
         if (exact)
             morph_blanket_find_exact(b, x);
         else

@@ -1,13 +1,11 @@
 /* Settle's run: implicit steps, Newton's iteration within one, the end. */
 #include "model/settle_internal.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Drag of the first step in loads per spacing: free fall then moves a quarter of a spacing. */
 #define FIRST_DRAG 4.0
-#define LEAST_DRAG 1e-6
+#define LEAST_DRAG 1e-3
 /* A joint moves this far in a Newton step and in an implicit step, at most (spacings): contacts within twice
  * the second are listed. */
 #define MOST_NEWTON 0.2
@@ -17,6 +15,9 @@
 enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 };
 /* Violation of limits that counts as held: a tenth of what lengths are checked to elsewhere, in spacings. */
 #define HELD 1e-7
+/* Depth of a whole element that counts as clear, in spacings: far below the smooth distance's own error,
+ * which is some 1e-3 and more at edges; a new place for less would only stir the contacts up again. */
+#define CLEAR 1e-5
 /* Penalties grow where an update leaves more than a quarter of a violation, to at most this. */
 #define MOST_PENALTY 1e5
 /* Kick that leaves a balanced but unstable shape, in spacings. */
@@ -93,7 +94,7 @@ static morph_status newton(morph_settle *s, double target, bool *good) {
             most = fmax(most, morph_norm(&s->d[3 * j]));
         }
         const bool found = search(s, energy, slope, most > MOST_NEWTON ? MOST_NEWTON / most : 1.0);
-        if (!found || most > 10.0 * MOST_NEWTON) s->drag = fmin(10.0 * s->drag, 1e6);
+        if (!found || most > 10.0 * MOST_NEWTON) s->drag = fmin(4.0 * s->drag, 1e6);
     }
 }
 
@@ -162,27 +163,25 @@ static morph_status run(morph_settle *s, const morph_control *control, morph_set
     s->exact_after = 0;
     for (r->steps = 0; r->steps < s->most_steps; r->steps++) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
-        const double deep = morph_settle_seek(s, s->x, fmax(5.0 * HELD, fmin(1e-3, 0.1 * move)));
+        const double deep = morph_settle_seek(s, s->x, fmax(0.5 * CLEAR, fmin(1e-3, 0.1 * move)));
         morph_settle_begin(s, s->x);
         memcpy(s->before, s->x, 3 * (size_t)s->joints * sizeof(double));
         r->residual = residual(s);
-        if (r->residual <= s->tolerance && worst <= HELD && deep <= 10.0 * HELD) {
+        if (r->residual <= s->tolerance && worst <= HELD && deep <= CLEAR) {
             r->converged = true;
             const morph_status status = morph_settle_examine(s, &r->stable);
             if (status != MORPH_OK || r->stable || r->saddles == MOST_SADDLES) return status;
             kick(s, r->saddles++);
             r->converged = false;
         }
-        if (r->steps > 0) next_drag(s, good, move, r->residual, last);
+        if (r->steps > 0)
+            next_drag(s, good, move, r->residual, last);
+        else /* a start close to rest, as a warm one, need not creep there */
+            s->drag = fmin(FIRST_DRAG, fmax(LEAST_DRAG, FIRST_DRAG * r->residual));
         last = r->residual;
         const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
         if (status != MORPH_OK) return status;
         move = largest_move(s, s->x);
-        if (getenv("TRACE"))
-            fprintf(stderr,
-                    "%d it %d res %.2e worst %.2e deep %.2e move %.2e drag %.2e good %d stiff %.1e E %.8f\n",
-                    r->steps, s->iterations, r->residual, worst, deep, move, s->drag, good, s->stiff,
-                    morph_settle_evaluate(s, s->x, MORPH_SETTLE_VALUE));
     }
     return MORPH_OK;
 }
@@ -246,6 +245,7 @@ morph_status morph_settle_run(morph_settle *s, double *x, bool warm, const morph
     s->iterations = 0;
     s->linear_seconds = 0.0;
     if (!warm) morph_settle_forget(s);
+    morph_settle_penalties(s);
     const morph_status status = run(s, control, &r);
     if (status == MORPH_OK || status == MORPH_ERR_STOPPED) {
         for (int k = 0; k < 3 * s->joints; k++)

@@ -1,7 +1,12 @@
 /* Contact of settle: joints, links and skin triangles with the target and the base plane, and friction.
  *
  * Each element is held at fixed places, and at places of its own choice: wherever the search finds it deeper
- * than these know, one of its seekers is put there. */
+ * than these know, one of its seekers is put there.
+ *
+ * A seeker is a half space within a step: where an element slides over an edge its deepest point stays at the
+ * edge and moves along the element, and the normal, which is the element's own, does not turn. A point of the
+ * element that kept to the curved distance would be turned over the edge instead, with a negative stiffness
+ * of force over the edge's radius that is not there. */
 #include "model/settle_internal.h"
 
 #include <string.h>
@@ -15,6 +20,11 @@ enum { LATTICE = 4 };
 /* A seeker this close in weight to a new deepest point moves there and takes its force along. */
 #define SAME_PLACE 0.02
 
+/* Weights below this are on the element's border, curvatures below that (per spacing) are flat. */
+#define EDGE 1e-3
+#define FLAT 1e-3
+/* Seekers without a force and further off than this are free again. */
+#define FORGET 0.05
 /* Kinetic friction in parts of static friction: what has slid comes to rest inside its cone, so that the last
  * small changes of a contact's force do not set it sliding again. */
 #define KINETIC 0.9
@@ -38,8 +48,10 @@ static void add_element(morph_settle *s, const int *joint, int corners, double r
     e->radius = radius / s->length_unit;
     e->first = s->places;
     memcpy(e->joint, joint, (size_t)corners * sizeof *joint);
-    for (int k = 0; k < MORPH_SETTLE_SEEKERS; k++)
+    for (int k = 0; k < MORPH_SETTLE_SEEKERS; k++) {
         add_place(s, joint, corners, NULL, radius);
+        s->place[s->places - 1].seeks = true;
+    }
 }
 
 /* The blanket's fixed places: joints, three on a link, four on a triangle. Links of the skin's layer are
@@ -103,12 +115,27 @@ static double distance(const morph_settle *s, const double q[3], double *g, doub
     return phi;
 }
 
+static double true_gap(const morph_settle *s, const morph_settle_place *p, const double q[3], double *g) {
+    if (!p->plane) return distance(s, q, g, NULL) - p->radius;
+    if (g) g[0] = g[1] = 0.0, g[2] = 1.0;
+    return q[2] - s->base - p->radius;
+}
+
 static double gap_of(const morph_settle *s, const morph_settle_place *p, const double q[3], double *g,
                      double *h) {
-    if (!p->plane) return distance(s, q, g, h) - p->radius;
-    if (g) g[0] = g[1] = 0.0, g[2] = 1.0;
-    if (h) memset(h, 0, 6 * sizeof *h);
-    return q[2] - s->base - p->radius;
+    double way[3];
+    if (h && (p->plane || p->seeks)) memset(h, 0, 6 * sizeof *h);
+    if (p->plane) return true_gap(s, p, q, g);
+    if (!p->seeks) return distance(s, q, g, h) - p->radius;
+    for (int k = 0; g && k < 3; k++)
+        g[k] = p->slope * p->normal[k];
+    morph_sub(q, p->at, way);
+    return p->gap + p->slope * morph_dot(p->normal, way);
+}
+
+/* Whether a place without a force stays clear of the target at q: the distance's slope is below 2. */
+static bool clear(const morph_settle_place *p, const double q[3]) {
+    return !p->plane && !p->seeks && p->push == 0.0 && p->gap > 2.0 * morph_dist(q, p->at);
 }
 
 static void spread(morph_settle *s, const morph_settle_place *p, const double force[3]) {
@@ -150,12 +177,62 @@ static double friction(const morph_settle *s, const morph_settle_place *p, const
     return slides ? m * way - m * m / (2.0 * k) : 0.5 * k * way * way;
 }
 
+/* What the moving of its place adds to a seeker's curvature where stability and derivatives are asked for.
+ * With c(x) = min over w of phi(sum w_j x_j), and E a basis of the weight changes that keep their sum and do
+ * not leave the element, grad2 c = (w w') H - M K^-1 M',   M_j = w_j H X E + grad phi E_j,   K = E'X'H X E;
+ * a direction without curvature in K (flat on flat) keeps its place. Adds -t grad2 c. */
+static void rolling(morph_settle *s, const morph_settle_place *p, const double *x, const double q[3],
+                    double t) {
+    static const int at[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    double g[3], h[6], e[2][3] = {{0}}, way[2][3], m[2][3][3], k[2][2] = {{0}}, inverse[2][2] = {{0}};
+    int inner[3], count = 0, n = 0;
+    distance(s, q, g, h);
+    for (int j = 0; j < p->corners; j++)
+        if (p->weight[j] > EDGE) inner[count++] = j;
+    for (; n + 1 < count; n++) {
+        e[n][inner[0]] = -1.0;
+        e[n][inner[n + 1]] = 1.0;
+        morph_sub(&x[3 * p->joint[inner[n + 1]]], &x[3 * p->joint[inner[0]]], way[n]);
+    }
+    for (int a = 0; a < n; a++)
+        for (int r = 0; r < 3; r++) {
+            double hx = 0.0;
+            for (int c = 0; c < 3; c++)
+                hx += h[at[r][c]] * way[a][c];
+            for (int j = 0; j < p->corners; j++)
+                m[a][j][r] = p->weight[j] * hx + e[a][j] * g[r];
+            for (int b = 0; b < n; b++)
+                k[a][b] += hx * way[b][r];
+        }
+    const double det = k[0][0] * k[1][1] - k[0][1] * k[1][0];
+    const int large = k[1][1] > k[0][0];
+    if (k[large][large] > FLAT && det > FLAT * k[large][large]) {
+        inverse[0][0] = k[1][1] / det;
+        inverse[1][1] = k[0][0] / det;
+        inverse[0][1] = inverse[1][0] = -k[0][1] / det;
+    } else if (k[large][large] > FLAT)
+        inverse[large][large] = 1.0 / k[large][large];
+    for (int i = 0; i < p->corners; i++)
+        for (int j = 0; j <= i; j++) {
+            double b[3][3];
+            for (int r = 0; r < 3; r++)
+                for (int c = 0; c < 3; c++) {
+                    b[r][c] = -t * p->weight[i] * p->weight[j] * h[at[r][c]];
+                    for (int u = 0; u < n; u++)
+                        for (int v = 0; v < n; v++)
+                            b[r][c] += t * m[u][i][r] * inverse[u][v] * m[v][j][c];
+                }
+            morph_settle_add(s, p->joint[i], p->joint[j], (const double(*)[3])b);
+        }
+}
+
 /* One place; see settle_energy.c for the limit's energy. */
 static double contact(morph_settle *s, const morph_settle_place *p, const double *x,
                       morph_settle_order order) {
     const bool plain = s->form == MORPH_SETTLE_PLAIN, hessian = order >= MORPH_SETTLE_EXACT;
     double q[3], g[3], second[6], force[3] = {0, 0, 0}, h[3][3] = {{0}};
     place_of(x, p->joint, p->corners, p->weight, q);
+    if (clear(p, q)) return 0.0;
     const double gap = gap_of(s, p, q, NULL, NULL);
     const double t = plain ? p->push : fmax(0.0, p->push - s->stiff * gap);
     double energy = plain ? -p->push * gap : (t - p->push) * (t + p->push) / (2.0 * s->stiff);
@@ -174,6 +251,7 @@ static double contact(morph_settle *s, const morph_settle_place *p, const double
                 h[r][c] += along * g[r] * g[c];
                 if (order == MORPH_SETTLE_EXACT) h[r][c] -= t * second[at[r][c]];
             }
+        if (plain && p->seeks && order == MORPH_SETTLE_EXACT) rolling(s, p, x, q, t);
     }
     if (hessian && (t > 0.0 || p->cone > 0.0)) spread_hessian(s, p, (const double(*)[3])h);
     return energy;
@@ -189,21 +267,19 @@ double morph_settle_contacts(morph_settle *s, const double *x, morph_settle_orde
 void morph_settle_begin(morph_settle *s, const double *x) {
     for (int n = 0; n < s->places; n++) {
         morph_settle_place *p = &s->place[n];
-        double q[3], g[3];
+        double g[3];
         p->near = false;
         p->cone = 0.0;
         if (!p->used) continue;
-        place_of(x, p->joint, p->corners, p->weight, q);
-        p->near = p->push > 0.0 || gap_of(s, p, q, NULL, NULL) < NEAR;
-        if (!p->near || s->friction == 0.0) continue;
-        gap_of(s, p, q, g, NULL);
+        place_of(x, p->joint, p->corners, p->weight, p->at);
+        p->gap = true_gap(s, p, p->at, g);
+        p->near = p->push > 0.0 || p->gap < NEAR;
         p->slope = morph_norm(g);
-        if (!(p->slope > 0.0)) continue; /* a ridge: no direction, and a cone of 0 */
-        for (int k = 0; k < 3; k++)
-            p->normal[k] = g[k] / p->slope;
+        for (int k = 0; k < 3; k++) /* on a ridge there is no direction: no force either */
+            p->normal[k] = p->slope > 0.0 ? g[k] / p->slope : 0.0;
         const double off = morph_dot(p->slip, p->normal);
         for (int k = 0; k < 3; k++)
-            p->anchor[k] = q[k] - (p->slip[k] - off * p->normal[k]);
+            p->anchor[k] = p->at[k] - (p->slip[k] - off * p->normal[k]);
         p->cone = s->friction * p->push * p->slope;
     }
 }
@@ -239,6 +315,7 @@ double morph_settle_update_contacts(morph_settle *s, const double *x) {
         if (!p->near) continue;
         double q[3];
         place_of(x, p->joint, p->corners, p->weight, q);
+        if (clear(p, q)) continue;
         const double gap = gap_of(s, p, q, NULL, NULL);
         p->push = fmax(0.0, p->push - s->stiff * gap);
         p->cone = s->friction * p->push * p->slope;
@@ -250,7 +327,14 @@ double morph_settle_update_contacts(morph_settle *s, const double *x) {
 /* Least distance over the element: the best of a lattice, then towards and away from the corners. */
 static double deepest(const morph_settle *s, const morph_settle_element *e, const double *x,
                       double weight[3]) {
-    double least = INFINITY, q[3];
+    static const double middle[2][3] = {{0.5, 0.5, 0.0}, {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}};
+    double least, q[3], reach = 0.0;
+    place_of(x, e->joint, e->corners, middle[e->corners == 3], q);
+    for (int j = 0; j < e->corners; j++)
+        reach = fmax(reach, morph_dist(q, &x[3 * e->joint[j]]));
+    least = distance(s, q, NULL, NULL);
+    if (least - e->radius > 2.0 * reach) return least;
+    least = INFINITY;
     for (int i = 0; i <= LATTICE; i++)
         for (int j = 0; j <= (e->corners == 3 ? LATTICE - i : 0); j++) {
             const double w[3] = {(double)i / LATTICE,
@@ -313,6 +397,10 @@ double morph_settle_seek(morph_settle *s, const double *x, double tolerance) {
     for (int n = 0; n < s->elements; n++) {
         const morph_settle_element *e = &s->element[n];
         double weight[3] = {0, 0, 0};
+        for (int k = 0; k < MORPH_SETTLE_SEEKERS; k++) {
+            morph_settle_place *p = &s->place[e->first + k];
+            if (p->push == 0.0 && p->gap > FORGET) p->used = false;
+        }
         const double depth = e->radius - deepest(s, e, x, weight);
         worst = fmax(worst, depth);
         if (!(depth > tolerance)) continue;

@@ -21,15 +21,17 @@ typedef struct morph_settle_place {
     int joint[3], corners;
     double weight[3]; /* barycentric */
     double radius;
-    bool plane;       /* touches the base plane */
-    bool used;        /* a place that looks for the deepest point may have nothing to hold */
-    bool near;        /* within reach of this step */
-    double push;      /* multiplier, >= 0 */
-    double slip[3];   /* stretch of the friction spring */
-    double normal[3]; /* at the step's start */
-    double slope;     /* of the distance there */
-    double anchor[3]; /* where the friction spring hangs in this step */
-    double cone;      /* most friction in this step */
+    bool plane;        /* touches the base plane */
+    bool used;         /* a place that looks for the deepest point may have nothing to hold */
+    bool near;         /* within reach of this step */
+    bool seeks;        /* stands at an element's deepest point */
+    double push;       /* multiplier, >= 0 */
+    double slip[3];    /* stretch of the friction spring */
+    double normal[3];  /* at the step's start */
+    double slope;      /* of the distance there */
+    double at[3], gap; /* place and gap there */
+    double anchor[3];  /* where the friction spring hangs in this step */
+    double cone;       /* most friction in this step */
 } morph_settle_place;
 
 /* Places per element that look for its deepest points. */
@@ -97,8 +99,9 @@ struct morph_settle {
 #define MORPH_SETTLE_LEAST_PUSH 1e-9
 
 /* settle_state.c */
-/* Load, centres and penalties for these centres (NULL: the ones there); multipliers keep their newtons. */
+/* Load, centres and penalties for these centres; multipliers keep their newtons. */
 void morph_settle_scale(morph_settle *s, const morph_attractor *attractor);
+void morph_settle_penalties(morph_settle *s); /* those that a run starts with */
 
 /* settle_pattern.c */
 morph_status morph_settle_pattern_create(morph_settle *s);

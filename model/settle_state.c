@@ -10,6 +10,9 @@
 /* Of cosines, whose gradient is one over an arm of half a spacing or one. */
 #define ANGLE_PENALTY 100.0
 
+/* Of friction springs: a joint's load held by friction moves it by 1e-4 spacings. */
+#define GRIP 1e4
+
 morph_settle_def morph_settle_defaults(void) {
     return (morph_settle_def){.gravity = 9.81, .base = NAN, .tolerance = 1e-6, .most_steps = 400};
 }
@@ -30,6 +33,13 @@ static bool centres_finite(const morph_attractor *a, int n) {
     for (int m = 0; m < n; m++)
         if (!isfinite(morph_dot(a[m].at, a[m].at)) || !isfinite(a[m].strength)) return false;
     return true;
+}
+
+void morph_settle_penalties(morph_settle *s) {
+    s->stiff = PENALTY;
+    s->grip = GRIP;
+    s->stiff_angle = ANGLE_PENALTY;
+    s->stiff_length = fmax(s->stiff, s->spring);
 }
 
 /* A centre pulls hardest at e / sqrt 2: with s * 2 / (3 sqrt 3 e^2). */
@@ -63,9 +73,7 @@ void morph_settle_scale(morph_settle *s, const morph_attractor *attractor) {
         for (int k = 0; k < 3; k++)
             s->place[n].slip[k] *= change;
     }
-    s->stiff = PENALTY, s->grip = 10000.0;
-    s->stiff_angle = ANGLE_PENALTY;
-    s->stiff_length = fmax(s->stiff, s->spring);
+    morph_settle_penalties(s);
 }
 
 /* Joints of a tuple with their parts in u and v. */

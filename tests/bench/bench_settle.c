@@ -80,8 +80,6 @@ static void line(const char *name, const scene *s, const morph_settle *settle, d
 
 static void settle_line(const char *name, scene *s, morph_settle *settle, bool warm, double dynamics) {
     morph_settle_report r = {0};
-    const int before = warm ? 0 : 0;
-    (void)before;
     const morph_status status = morph_settle_run(settle, s->x, warm, NULL, &r);
     line(name, s, settle, r.seconds);
     printf(

@@ -36,7 +36,7 @@ static inline void scene_make(scene *s, const morph_structure_def *def, bool sph
     const double size[3] = {0.5 * width, 0.5 * width, 0.3 * width}, radii[3] = {r, r, r};
     const double height = sphere ? 2.0 * r : size[2];
     morph_mesh mesh;
-    assert_int_equal(sphere ? morph_mesh_ellipsoid(radii, 0.01 * a, &mesh) : morph_mesh_box(size, &mesh),
+    assert_int_equal(sphere ? morph_mesh_ellipsoid(radii, 0.002 * a, &mesh) : morph_mesh_box(size, &mesh),
                      MORPH_OK);
     for (int i = 0; i < mesh.vertices; i++)
         mesh.v[3 * i + 2] += 0.5 * height;
