@@ -22,7 +22,7 @@ morph_body_def morph_body_defaults(void) {
                             .gravity = 9.81,
                             .friction = 0.5,
                             .base = NAN,
-                            .pin_base = true};
+                            .pin = 0.0};
 }
 
 static bool usable(const morph_body_def *d) {
@@ -125,15 +125,33 @@ static morph_status set_springs(morph_body *b) {
     return MORPH_OK;
 }
 
+/* Length of the volume's gradient by a corner: a third of the area of the face opposite. */
+static double gradient_at(const double *x, const int t[4], int corner) {
+    double a[3], b[3], n[3];
+    const int i = t[(corner + 1) & 3], j = t[(corner + 2) & 3], k = t[(corner + 3) & 3];
+    morph_sub(&x[3 * j], &x[3 * i], a);
+    morph_sub(&x[3 * k], &x[3 * i], b);
+    morph_cross(a, b, n);
+    return morph_norm(n) / 6.0;
+}
+
 /* Gershgorin for M^-1 K: row i has the diagonal block sum_j k n n^T / m_i and off it one block of the same
- * size for every spring, so omega^2 <= 2 sum_j k / m_i. Holds for every deformation: a spring's own stiffness
- * along it is k, across it k (1 - l0 / l), which is below k where stretched and negative where pressed. */
+ * size for every spring, so omega^2 <= 2 sum_j k / m_i; of a squeezed tetrahedron, blocks E g_i g_j^T / V0
+ * with the volume's gradients g. A spring's own stiffness along it is k, across it k (1 - l0 / l), which is
+ * below k where stretched and negative where pressed: it holds for every deformation. */
 static void set_stable(morph_body *b) {
     double *sum = b->keep, most = 0.0;
     memset(sum, 0, (size_t)b->vertices * sizeof *sum);
     for (int s = 0; s < b->springs; s++)
         for (int k = 0; k < 2; k++)
             sum[b->spring[s][k]] += 2.0 * b->stiffness[s];
+    for (int t = 0; t < b->mesh.tets; t++) {
+        double g[4];
+        for (int k = 0; k < 4; k++)
+            g[k] = gradient_at(b->mesh.v, b->mesh.tet[t], k);
+        for (int k = 0; k < 4; k++)
+            sum[b->mesh.tet[t][k]] += b->def.young * g[k] * (g[0] + g[1] + g[2] + g[3]) / b->volume[t];
+    }
     for (int i = 0; i < b->vertices; i++)
         most = fmax(most, sum[i] / b->mass[i]);
     b->stable = STEP_SAFETY * 2.0 / sqrt(most);
@@ -167,8 +185,8 @@ static morph_status build(morph_body *b, const morph_tetra *mesh) {
     memcpy(b->predicted, b->x, bytes);
     double lowest;
     const double size = set_size(b, &lowest);
-    for (int i = 0; i < b->vertices && b->def.pin_base && !isnan(b->def.base); i++)
-        if (b->x[3 * i + 2] <= b->def.base + ON_BASE * size) morph_body_pin(b, i);
+    for (int i = 0; i < b->vertices && b->def.pin >= 0.0 && !isnan(b->def.base); i++)
+        if (b->x[3 * i + 2] <= b->def.base + b->def.pin + ON_BASE * size) morph_body_pin(b, i);
     return MORPH_OK;
 }
 
@@ -227,6 +245,10 @@ void morph_body_energies(const morph_body *b, double *kinetic, double *spring, d
             const double stretch =
                 morph_dist(&b->x[3 * b->spring[s][0]], &b->x[3 * b->spring[s][1]]) - b->length[s];
             *spring += 0.5 * b->stiffness[s] * stretch * stretch;
+        }
+        for (int t = 0; t < b->mesh.tets; t++) {
+            const double lack = MORPH_BODY_SQUEEZED * b->volume[t] - morph_tetra_volume(b->x, b->mesh.tet[t]);
+            if (lack > 0.0) *spring += 0.5 * b->def.young * lack * lack / b->volume[t];
         }
     }
     if (height) {

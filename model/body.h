@@ -1,17 +1,22 @@
-/* A deformable target: a tetrahedral mesh as masses and springs, kept from inverting by a unilateral volume
- * constraint of every tetrahedron. Kick-drift-kick leapfrog with a step of its own. Deterministic; nothing
- * allocates after create.
+/* A deformable target: a tetrahedral mesh as masses and springs; a penalty resists squeezed tetrahedra, and a
+ * unilateral constraint on the volume of each keeps it from inverting. Kick-drift-kick leapfrog with a step
+ * of its own. Deterministic; nothing allocates after create.
  *
  * Stiffness. Every edge of every tetrahedron carries k = E V / l^2 (van Gelder 1998), summed over the
  * tetrahedra at the edge. With strain e a spring along the unit vector n holds k l^2 (n.e n)^2 / 2, so a
  * tetrahedron's six hold E V / 2 times the sum of (n.e n)^2. Over directions evenly spread the mean of
  * (n.e n)^2 is (2 e:e + tr(e)^2) / 15: an energy density of E (0.4 e:e + 0.2 tr(e)^2), which is that of an
  * isotropic solid with both Lame constants 0.4 E: Young's modulus (5/2) 0.4 E = E, Poisson's ratio 1/4.
- * Central springs know no other ratio. Real meshes come within some per cent of E (see the test). */
+ * Central springs know no other ratio. They also give way sideways when pressed hard; so a tetrahedron whose
+ * volume V is below V1 = MORPH_BODY_SQUEEZED V0 holds E (V - V1)^2 / (2 V0) more, a bulk modulus of E there.
+ * (A bar pressed by 20 % keeps 0.9 of its volume: up to there E is what springs make it.) Real meshes come
+ * within some per cent of E (see the test). */
 #ifndef MORPH_BODY_H
 #define MORPH_BODY_H
 
 #include "model/tetra.h"
+
+#define MORPH_BODY_SQUEEZED 0.9
 
 typedef struct morph_body_def {
     double young;   /* Pa */
@@ -22,10 +27,10 @@ typedef struct morph_body_def {
     double gravity; /* m/s2, downward */
     double friction; /* Coulomb coefficient at the base plane */
     double base;     /* height of the base plane, NaN for none */
-    bool pin_base;   /* vertices that start on the base plane (or below) stay where they are */
+    double pin; /* m; vertices that start no higher than this above the base plane are held; negative: none */
 } morph_body_def;
 
-/* young 2e4, density 300, damping 0.1, gravity 9.81, friction 0.5, no base, pin_base. */
+/* young 2e4, density 300, damping 0.1, gravity 9.81, friction 0.5, no base, pin 0. */
 morph_body_def morph_body_defaults(void);
 
 typedef struct morph_body_counts {
@@ -76,7 +81,7 @@ void morph_body_sweep(morph_body *body);
  * turns what was moved into velocity, v += (x - x after the step) / h. */
 void morph_body_moved(morph_body *body, double h);
 
-/* Kinetic energy, energy of the springs, and weight times height, J. Any may be NULL. */
+/* Kinetic energy, energy of springs and squeezed volumes, and weight times height, J. Any may be NULL. */
 void morph_body_energies(const morph_body *body, double *kinetic, double *spring, double *height);
 /* Least volume of a tetrahedron relative to its volume at rest. */
 double morph_body_least_volume(const morph_body *body);

@@ -15,6 +15,34 @@
 #define MOST_REFINES 4
 #define MOST_SUBSTEPS 1e6
 
+/* Six times the volume of a tetrahedron, and its gradients: they add up to 0 and carry no moment, so forces
+ * and corrections along them keep both momenta. */
+static double volume_gradients(const double *x, const int t[4], double g[4][3]) {
+    double a[3], b[3], c[3];
+    morph_sub(&x[3 * t[1]], &x[3 * t[0]], a);
+    morph_sub(&x[3 * t[2]], &x[3 * t[0]], b);
+    morph_sub(&x[3 * t[3]], &x[3 * t[0]], c);
+    morph_cross(b, c, g[1]);
+    morph_cross(c, a, g[2]);
+    morph_cross(a, b, g[3]);
+    for (int k = 0; k < 3; k++)
+        g[0][k] = -(g[1][k] + g[2][k] + g[3][k]);
+    return morph_dot(a, g[1]);
+}
+
+/* f_i = E (V1 - V) / V0 grad_i V where V < V1 (body.h). */
+static void add_squeeze(morph_body *b, int tet) {
+    const int *t = b->mesh.tet[tet];
+    const double lack = MORPH_BODY_SQUEEZED * b->volume[tet] - morph_tetra_volume(b->x, t);
+    if (!(lack > 0.0)) return;
+    double g[4][3];
+    volume_gradients(b->x, t, g);
+    const double pressure = b->def.young * lack / b->volume[tet] / 6.0;
+    for (int k = 0; k < 4; k++)
+        for (int i = 0; i < 3; i++)
+            b->a[3 * t[k] + i] += pressure * g[k][i];
+}
+
 static void accelerations(morph_body *b, const double *external) {
     double *a = b->a;
     for (int i = 0; i < 3 * b->vertices; i++)
@@ -31,6 +59,8 @@ static void accelerations(morph_body *b, const double *external) {
             a[3 * j + k] -= force * d[k];
         }
     }
+    for (int t = 0; t < b->mesh.tets; t++)
+        add_squeeze(b, t);
     for (int i = 0; i < b->vertices; i++) {
         for (int k = 0; k < 3; k++)
             a[3 * i + k] *= b->inverse[i];
@@ -69,21 +99,6 @@ static void damp(morph_body *b, double h, bool backward) {
         damp_spring(b, backward ? b->springs - 1 - n : n, h);
     for (int i = 0; i < 3 * b->vertices && b->def.drag > 0.0; i++)
         b->v[i] *= factor;
-}
-
-/* Six times the gradients of a tetrahedron's volume: the area vectors of the faces, inward (doubled). They
- * add up to 0 and carry no moment, so the corrections keep both momenta. */
-static double volume_gradients(const double *x, const int t[4], double g[4][3]) {
-    double a[3], b[3], c[3];
-    morph_sub(&x[3 * t[1]], &x[3 * t[0]], a);
-    morph_sub(&x[3 * t[2]], &x[3 * t[0]], b);
-    morph_sub(&x[3 * t[3]], &x[3 * t[0]], c);
-    morph_cross(b, c, g[1]);
-    morph_cross(c, a, g[2]);
-    morph_cross(a, b, g[3]);
-    for (int k = 0; k < 3; k++)
-        g[0][k] = -(g[1][k] + g[2][k] + g[3][k]);
-    return morph_dot(a, g[1]);
 }
 
 /* C = V - LEAST V0 >= 0: dx_i = -C w_i grad_i / sum w |grad|^2. Returns whether it was violated. */

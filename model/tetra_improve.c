@@ -10,6 +10,7 @@
 #define SHARP 0.766
 /* How far (in cells) a vertex may be moved onto a feature, and the worst shape that may come of it. */
 #define SNAP_REACH 0.7
+#define CORNER_REACH 1.5
 #define SNAP_QUALITY 0.15
 #define PASSES 8
 
@@ -111,7 +112,7 @@ static void closest_on(const double *a, const double *b, const double *p, double
 static morph_status snap_to(work *w, const int *ends, int features, bool once) {
     const morph_mesh *target = morph_distance_mesh(w->target);
     const morph_tetra *mesh = w->mesh;
-    const double reach = SNAP_REACH * w->cell;
+    const double reach = (once ? CORNER_REACH : SNAP_REACH) * w->cell;
     const int n = mesh->surface_vertices;
     morph_box *box = morph_alloc((size_t)n + (size_t)features, sizeof *box);
     bool *taken = morph_alloc((size_t)features, sizeof *taken);
@@ -152,6 +153,28 @@ static morph_status snap_to(work *w, const int *ends, int features, bool once) {
     return status;
 }
 
+/* Tips: vertices where no sharp edge ends but triangles lean away from their mean normal as far as at a sharp
+ * edge (the point of a cone). Their degree is set to 1. */
+static morph_status mark_tips(const work *w, int *degree) {
+    const morph_mesh *mesh = morph_distance_mesh(w->target);
+    double *mean = morph_alloc((size_t)mesh->vertices, 3 * sizeof *mean), n[3];
+    bool *tip = morph_alloc((size_t)mesh->vertices, sizeof *tip);
+    for (int pass = 0; pass < 2 && mean && tip; pass++)
+        for (int i = 0; i < 3 * mesh->triangles; i++) {
+            double *m = &mean[3 * mesh->t[i]];
+            normal_of(mesh, i / 3, n);
+            if (pass == 1 && morph_dot(m, n) < SHARP * morph_norm(m)) tip[mesh->t[i]] = true;
+            for (int k = 0; k < 3 && pass == 0; k++)
+                m[k] += n[k];
+        }
+    for (int i = 0; i < mesh->vertices && mean && tip; i++)
+        if (tip[i] && degree[i] == 0) degree[i] = 1;
+    const bool done = mean && tip;
+    free(mean);
+    free(tip);
+    return done ? MORPH_OK : MORPH_ERR_NOMEM;
+}
+
 /* Corners: where other than two sharp edges meet. */
 static morph_status snap_features(work *w) {
     const int vertices = morph_distance_mesh(w->target)->vertices;
@@ -164,12 +187,13 @@ static morph_status snap_features(work *w) {
             degree[w->sharp[i].a]++;
             degree[w->sharp[i].b]++;
         }
+        status = mark_tips(w, degree);
         for (int i = 0; i < vertices; i++)
             if (degree[i] != 0 && degree[i] != 2) {
                 ends[2 * corners] = ends[2 * corners + 1] = i;
                 corners++;
             }
-        if (corners > 0) status = snap_to(w, ends, corners, true);
+        if (status == MORPH_OK && corners > 0) status = snap_to(w, ends, corners, true);
         for (int i = 0; i < w->sharps; i++) {
             ends[2 * i] = w->sharp[i].a;
             ends[2 * i + 1] = w->sharp[i].b;

@@ -39,11 +39,12 @@ static void test_forces(void **state) {
     morph_body_def def = plain();
     morph_body *b = box_body(size, 0.1, &def);
     for (int i = 0; i < 3 * b->vertices; i++)
-        b->x[i] += uniform(-0.01, 0.01);
+        b->x[i] += uniform(-0.01, 0.01); /* some tetrahedra are squeezed, none is held */
     /* v after a step so short that x does not move is h a. */
     const double h = 1e-9, e = 1e-6;
     double *x = forces_of(b), worst = 0.0, largest = 0.0;
     memcpy(x, b->x, 3 * (size_t)b->vertices * sizeof *x);
+    assert_true(morph_body_least_volume(b) < 0.8 && morph_body_least_volume(b) > 0.3);
     assert_true(morph_body_step(b, h, NULL));
     for (int i = 0; i < 3 * b->vertices; i++) {
         double up, down;
@@ -191,7 +192,7 @@ static void test_crush(void **state) {
     const double size[3] = {0.2, 0.2, 0.2};
     morph_body_def def = morph_body_defaults();
     def.base = -0.1;
-    def.pin_base = false;
+    def.pin = -1.0;
     double least = INFINITY;
     morph_body *b = box_body(size, 0.07, &def);
     for (int i = 0; i < b->vertices; i++)
