@@ -171,8 +171,9 @@ static morph_box box_around(const double *x, int n, double margin) {
     morph_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < n; i++)
         for (int k = 0; k < 3; k++) {
-            box.lo[k] = fmin(box.lo[k], x[3 * i + k] - margin);
-            box.hi[k] = fmax(box.hi[k], x[3 * i + k] + margin);
+            const double lo = x[3 * i + k] - margin, hi = x[3 * i + k] + margin;
+            box.lo[k] = lo < box.lo[k] ? lo : box.lo[k];
+            box.hi[k] = hi > box.hi[k] ? hi : box.hi[k];
         }
     return box;
 }

@@ -104,9 +104,10 @@ static void damp(morph_body *b, double h, bool backward) {
 /* C = V - LEAST V0 >= 0: dx_i = -C w_i grad_i / sum w |grad|^2. Returns whether it was violated. */
 static bool project_volume(morph_body *b, int tet) {
     const int *t = b->mesh.tet[tet];
+    /* Met, for a constraint that is approached from below. */
+    if (morph_tetra_volume(b->x, t) >= (LEAST_VOLUME - 1e-7) * b->volume[tet]) return false;
     double g[4][3], square = 0.0;
     const double c = volume_gradients(b->x, t, g) - 6.0 * LEAST_VOLUME * b->volume[tet];
-    if (c >= -1e-6 * b->volume[tet]) return false; /* met, for a constraint that is approached from below */
     for (int k = 0; k < 4; k++)
         square += b->inverse[t[k]] * morph_dot(g[k], g[k]);
     if (!(square > 0.0)) return false; /* all pinned, or shrunk to a line: taking back must help */

@@ -79,7 +79,10 @@ static const morph_box *box_of(const input *in, int i) {
 }
 
 static double extent_of(const morph_box *box) {
-    return fmax(box->hi[0] - box->lo[0], fmax(box->hi[1] - box->lo[1], box->hi[2] - box->lo[2]));
+    double most = box->hi[0] - box->lo[0];
+    for (int k = 1; k < 3; k++)
+        if (box->hi[k] - box->lo[k] > most) most = box->hi[k] - box->lo[k];
+    return most;
 }
 
 static morph_status validate(const input *in, double *largest) {
@@ -87,11 +90,10 @@ static morph_status validate(const input *in, double *largest) {
     for (int i = 0; i < in->n[0] + in->n[1]; i++) {
         const morph_box *box = box_of(in, i);
         for (int k = 0; k < 3; k++) {
-            const double far = fmax(fabs(box->lo[k]), fabs(box->hi[k]));
-            if (isnan(box->lo[k]) || isnan(box->hi[k]) || !(far <= MOST_COORDINATE))
-                return MORPH_ERR_NONFINITE;
+            const double lo = fabs(box->lo[k]), hi = fabs(box->hi[k]), far = lo > hi ? lo : hi;
+            if (!(lo <= MOST_COORDINATE) || !(hi <= MOST_COORDINATE)) return MORPH_ERR_NONFINITE;
             if (box->lo[k] > box->hi[k]) return MORPH_ERR_INPUT;
-            *largest = fmax(*largest, far);
+            if (far > *largest) *largest = far;
         }
     }
     return MORPH_OK;
@@ -168,15 +170,16 @@ static void set_levels(morph_hash *h, const input *in) {
     }
 }
 
-/* Mixed by multiplication (the 64-bit golden ratio and two of Teschner's primes) and a final shift: lattices
- * of cells spread over the buckets. */
+/* Two coordinates are mixed by multiplication (the 64-bit golden ratio and one of Teschner's primes) and
+ * shifts, so that lattices of cells spread over the buckets; the third is added, so that a column of cells
+ * lies side by side in memory. */
 static uint32_t bucket_of(const morph_hash *h, int64_t i, int64_t j, int64_t k, int level, int set) {
-    uint64_t key = (uint64_t)i * 73856093u ^ (uint64_t)j * 0x9E3779B97F4A7C15u ^ (uint64_t)k * 83492791u;
+    uint64_t key = (uint64_t)i * 73856093u ^ (uint64_t)j * 0x9E3779B97F4A7C15u;
     key += (uint64_t)(2 * level + set) * 0xD1B54A32D192ED03u;
     key ^= key >> 29;
     key *= 0xBF58476D1CE4E5B9u;
     key ^= key >> 32;
-    return (uint32_t)key & h->mask;
+    return (uint32_t)(key + (uint64_t)k) & h->mask;
 }
 
 /* Buckets of a box's cells, each once even where two cells share one. Returns the count, 8 at most. */
@@ -245,7 +248,7 @@ static morph_status add_pair(morph_hash *h, int i, int j) {
 static bool meets_here(const morph_hash *h, const morph_box *a, const morph_box *b, int level,
                        const int64_t at[3]) {
     for (int k = 0; k < 3; k++)
-        if (cell_at(fmax(a->lo[k], b->lo[k]), h->inverse[level]) != at[k]) return false;
+        if (cell_at(a->lo[k] > b->lo[k] ? a->lo[k] : b->lo[k], h->inverse[level]) != at[k]) return false;
     return true;
 }
 

@@ -48,8 +48,9 @@ static inline morph_box morph_box_of(const double *x, const int *p, int n, doubl
     for (int k = 0; k < 3; k++) {
         double lo = x[3 * p[0] + k], hi = lo;
         for (int i = 1; i < n; i++) {
-            lo = fmin(lo, x[3 * p[i] + k]);
-            hi = fmax(hi, x[3 * p[i] + k]);
+            const double at = x[3 * p[i] + k];
+            lo = at < lo ? at : lo;
+            hi = at > hi ? at : hi;
         }
         box.lo[k] = lo - margin;
         box.hi[k] = hi + margin;

@@ -28,15 +28,6 @@ void morph_tetra_free(morph_tetra *mesh) {
     *mesh = (morph_tetra){0};
 }
 
-double morph_tetra_volume(const double *x, const int t[4]) {
-    double a[3], b[3], c[3], n[3];
-    morph_sub(&x[3 * t[1]], &x[3 * t[0]], a);
-    morph_sub(&x[3 * t[2]], &x[3 * t[0]], b);
-    morph_sub(&x[3 * t[3]], &x[3 * t[0]], c);
-    morph_cross(a, b, n);
-    return morph_dot(n, c) / 6.0;
-}
-
 double morph_tetra_quality(const double *x, const int t[4]) {
     double sum = 0.0;
     for (int i = 0; i < 4; i++)

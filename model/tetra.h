@@ -55,7 +55,14 @@ morph_status morph_tetra_fill(const morph_distance *target, double cell, morph_t
                               morph_tetra_report *report);
 
 /* Volumes and shape of one tetrahedron of a mesh with vertices at x. */
-double morph_tetra_volume(const double *x, const int tet[4]);
+static inline double morph_tetra_volume(const double *x, const int tet[4]) {
+    double a[3], b[3], c[3], n[3];
+    morph_sub(&x[3 * tet[1]], &x[3 * tet[0]], a);
+    morph_sub(&x[3 * tet[2]], &x[3 * tet[0]], b);
+    morph_sub(&x[3 * tet[3]], &x[3 * tet[0]], c);
+    morph_cross(a, b, n);
+    return morph_dot(n, c) / 6.0;
+}
 double morph_tetra_quality(const double *x, const int tet[4]);
 
 /* Incident tetrahedra of every vertex: those of vertex i are list[first[i]] .. list[first[i + 1] - 1],
