@@ -216,7 +216,10 @@ static bool drift(morph_blanket_state *b) {
     }
     if (!(fastest <= b->most_move) || !morph_blanket_finite(b)) return false;
     morph_blanket_project_posts_along(b);
-    morph_blanket_list_limits(b, b->x, morph_blanket_moved(b, b->x), false);
+    const double moved = morph_blanket_moved(b, b->x);
+    b->status = morph_blanket_find_self(b, moved);
+    if (b->status != MORPH_OK) return false;
+    morph_blanket_list_limits(b, b->x, moved, false);
     morph_blanket_find_contacts(b, b->x);
     morph_blanket_project_start(b, b->x, WARM);
     for (int sweep = 0; sweep < MORPH_BLANKET_SWEEPS; sweep++) {

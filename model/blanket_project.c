@@ -345,6 +345,7 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, doubl
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
         project_panel(b, backward ? panels - 1 - p : p, x);
+    morph_blanket_project_self(b, x, backward);
     for (int c = 0; c < b->contacts; c++)
         morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
     project_posts(b, x);

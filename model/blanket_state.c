@@ -44,6 +44,7 @@ static morph_status allocate(morph_blanket_state *b) {
     for (int k = 0; k < b->def.fixed_count; k++)
         b->weight[b->def.fixed[k]] = 0.0;
     morph_status status = morph_blanket_fix_create(b->structure, &b->fix);
+    if (status == MORPH_OK) status = morph_blanket_self_create(b->structure, &b->self);
     if (status == MORPH_OK) status = morph_blanket_limits_create(b);
     return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
 }
@@ -96,6 +97,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->push);
     free(b->angle);
     morph_blanket_fix_destroy(b->fix);
+    morph_blanket_self_destroy(b->self);
     free(b->memo);
     free(b->touch);
     free(b->contact);
