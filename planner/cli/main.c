@@ -16,6 +16,9 @@ static const char usage_text[] =
     "ending + .plan)\n"
     "  check DIR [--schedule FILE]        verify a plan folder, or a schedule file against its plan\n"
     "  picture DIR -o FILE.svg|png        still pictures: four moments, lengths over time\n"
+    "          [--of MOTION]              of the schedule (default), the blanket, the replay of its "
+    "lengths,\n"
+    "                                     or core: the replay with the target as a solid core\n"
     "  info SCENE                         structure with link numbers, mobility, target; solves nothing\n"
     "\n"
     "options of plan:\n"
@@ -139,12 +142,13 @@ enum {
     O_VERBOSE,
     O_THREADS,
     O_SCHEDULE,
+    O_OF,
     O_HELP,
     O_VERSION
 };
 
 typedef struct arguments {
-    const char *output, *method, *schedule, *subject;
+    const char *output, *method, *schedule, *motion, *subject;
     bool overwrite, json, quiet, verbose;
 } arguments;
 
@@ -183,6 +187,12 @@ static int take_option(int option, const char *value, arguments *a) {
     case O_VERBOSE:
         a->verbose = true;
         return 0;
+    case O_OF:
+        a->motion = value;
+        if (strcmp(value, "schedule") == 0 || strcmp(value, "blanket") == 0 || strcmp(value, "replay") == 0 ||
+            strcmp(value, "core") == 0)
+            return 0;
+        return usage_fault("--of", value, "schedule, blanket, replay, core");
     case O_SCHEDULE:
         a->schedule = value;
         return 0;
@@ -207,6 +217,7 @@ static int read_arguments(int argc, char **argv, arguments *a) {
                                             {"verbose", no_argument, NULL, O_VERBOSE},
                                             {"threads", required_argument, NULL, O_THREADS},
                                             {"schedule", required_argument, NULL, O_SCHEDULE},
+                                            {"of", required_argument, NULL, O_OF},
                                             {"help", no_argument, NULL, O_HELP},
                                             {"version", no_argument, NULL, O_VERSION},
                                             {NULL, 0, NULL, 0}};
@@ -270,7 +281,8 @@ static int run_check(const arguments *a) {
 
 static int run_picture(const arguments *a) {
     screen s;
-    const morph_job job = make_job(a, &s);
+    morph_job job = make_job(a, &s);
+    job.motion = a->motion;
     if (!a->output) return usage_fault("picture", "no -o", "-o FILE.svg or -o FILE.png");
     return morph_picture_folder(a->subject, a->output, &job);
 }
