@@ -162,6 +162,8 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, doubl
 bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
                              double grad[4][3]);
 double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
+/* The same with its gradient by the angle's joints, those held 0; false where it has none. */
+bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]);
 double morph_blanket_cosine(const morph_angle *a, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);

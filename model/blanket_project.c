@@ -225,6 +225,11 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double m
     }
 }
 
+bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]) {
+    double arm;
+    return cosine(a, x, c, grad, &arm) > 0.0;
+}
+
 static double clip(double value, double most) {
     return fmax(-most, fmin(most, value));
 }

@@ -25,8 +25,8 @@ static bool arrays_ok(const morph_structure *s, const morph_blanket_def *d) {
 }
 
 static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
-    const double least_zero[] = {d->gravity, d->drag, d->friction,  d->time,
-                                 d->step,    d->rise, d->rise_time, d->softening};
+    const double least_zero[] = {d->gravity, d->drag,      d->friction,  d->time,  d->step,
+                                 d->rise,    d->rise_time, d->softening, d->square};
     for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
         if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
     if (!finite3(d->velocity) || (d->rise > 0.0 && !(d->rise_time > 0.0)) || !arrays_ok(s, d)) return false;

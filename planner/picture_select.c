@@ -19,7 +19,7 @@ static void drop_schedule(morph_record *r) {
 }
 
 /* A replay takes the blanket's place; its lengths are those of its joints. */
-static morph_status take_replay(morph_record *r, int frames, double **time, double **joints) {
+static morph_status take_replay(morph_record *r, int frames, double **time, double **joints, bool core) {
     const size_t links = (size_t)r->links, width = 3 * (size_t)r->joints;
     double *lengths = morph_alloc((size_t)frames, links * sizeof(double));
     if (!lengths) return MORPH_ERR_NOMEM;
@@ -37,6 +37,7 @@ static morph_status take_replay(morph_record *r, int frames, double **time, doub
     r->nominal_joints = *joints;
     r->nominal_lengths = lengths;
     r->offset_nominal = NULL;
+    if (!core) r->target_vertices = r->target_triangles = 0; /* it is not there */
     *time = *joints = NULL;
     return MORPH_OK;
 }
@@ -54,6 +55,6 @@ morph_status morph_picture_select(morph_record *r, const char *motion, char *mes
     if (which == 0) return MORPH_OK;
     drop_schedule(r);
     if (which == 1) return MORPH_OK;
-    return which == 2 ? take_replay(r, r->replay_frames, &r->replay_time, &r->replay_joints)
-                      : take_replay(r, r->core_frames, &r->core_time, &r->core_joints);
+    return which == 2 ? take_replay(r, r->replay_frames, &r->replay_time, &r->replay_joints, false)
+                      : take_replay(r, r->core_frames, &r->core_time, &r->core_joints, true);
 }
