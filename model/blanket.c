@@ -52,6 +52,8 @@ static morph_violation record(morph_blanket_state *b, double time, morph_traject
     double *x = &t->x[(size_t)t->frames * 3 * (size_t)b->joints];
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));
     const morph_violation worst = morph_blanket_polish(b, x);
+    /* What was in the target by exact distances would be so again: the motion goes on from outside. */
+    if (b->entered) memcpy(b->x, x, 3 * (size_t)b->joints * sizeof(double));
     t->lift[t->frames] = b->lift;
     t->time[t->frames++] = time;
     return worst;

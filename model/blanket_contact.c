@@ -22,6 +22,10 @@
 #define SWEPT_CLOSE 0.05
 #define SWEPT_STRIDES 64
 
+/* A seeking place moves to where the exact distance is deepest if that is deeper by this, spacings: places at
+ * rest stay where they are. */
+#define SEEK_GAIN 5e-3
+
 static morph_touch *add_touch(morph_blanket_state *b, const int *joint, int corners, const double *weight,
                               double radius) {
     morph_touch *t = &b->touch[b->touches++];
@@ -58,12 +62,14 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     for (int l = 0; l < s->links; l++) {
         for (int k = 0; k < 3; k++)
             add_touch(b, s->link[l], 2, along[k], s->link_radius[l]);
-        if (s->link_kind[l] != MORPH_LINK_BOTTOM)
-            add_touch(b, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
+        if (s->link_kind[l] == MORPH_LINK_BOTTOM) continue;
+        b->memo[l].touch = b->touches;
+        add_touch(b, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
     }
     for (int t = 0; t < s->skin_triangles; t++) {
         for (int k = 0; k < 4; k++)
             add_touch(b, s->skin[t], 3, within[k], s->def.radius);
+        b->memo[s->links + t].touch = b->touches;
         add_touch(b, s->skin[t], 3, within[3], s->def.radius)->stride = LONGEST_STRIDE;
     }
     return MORPH_OK;
@@ -364,18 +370,36 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
         const element e = element_of(s, n);
         if (!e.tested) continue;
         morph_memo *memo = &b->memo[n];
-        double v[3][3], weight[3], moved = 0.0;
+        double v[3][3], moved = 0.0;
         morph_closest at;
         place_element(b, x, e.joint, e.corners, v);
         for (int k = 0; k < e.corners && memo->known; k++)
             moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
         if (memo->known && memo->gap - moved >= 0.0) continue;
-        memo->gap = exact_gap(b, v, e.corners, e.radius, weight, &at);
-        memo->known = true;
+        memo->gap = exact_gap(b, v, e.corners, e.radius, memo->weight, &at);
+        memo->known = memo->fresh = true;
         memcpy(memo->corner, v, sizeof v);
         depth = fmax(depth, -memo->gap);
     }
     return depth;
+}
+
+void morph_blanket_seek_deepest(morph_blanket_state *b) {
+    const morph_structure *s = b->structure;
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        morph_memo *memo = &b->memo[n];
+        if (!memo->fresh) continue;
+        memo->fresh = false;
+        if (memo->gap > NEAR * s->spacing) continue;
+        morph_touch *t = &b->touch[memo->touch];
+        double q[3];
+        place_of(b->x, t->joint, t->corners, t->weight, q);
+        const double here = distance_at(b, q, NULL) - t->radius;
+        if (memo->gap >= 0.0 && memo->gap > here - SEEK_GAIN * s->spacing) continue;
+        memcpy(t->weight, memo->weight, sizeof t->weight);
+        t->stride = SHORTEST_STRIDE;
+        t->wake = 0.0;
+    }
 }
 
 /* One contact at the deepest place of an element. */

@@ -63,7 +63,9 @@ typedef struct morph_angle {
 /* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
 typedef struct morph_memo {
     double corner[3][3], gap;
-    bool known;
+    double weight[3];  /* of the deepest place */
+    int touch;         /* the place that seeks on it */
+    bool known, fresh; /* fresh: taken since the last morph_blanket_seek_deepest */
 } morph_memo;
 
 /* How far the state is from its limits; violations are >= 0. */
@@ -111,6 +113,7 @@ typedef struct morph_blanket_state {
     morph_blanket_self *self;
     morph_status status; /* why a step failed, where not for its size */
     double *spare_x;     /* 3*joints */
+    bool entered;        /* the last frame had to be brought out of the target by exact distances */
     morph_memo *memo;    /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
@@ -203,6 +206,9 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x);
 /* The same by exact distances over whole links and triangles. An element that has moved less than its last
  * distance left over is not measured again. */
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
+/* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
+ * between the fixed places is then felt by the steps that follow. */
+void morph_blanket_seek_deepest(morph_blanket_state *b);
 /* Lists the contacts near x by exact distances. */
 void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
 /* Part of project_start; most: largest push to start with, m. */

@@ -10,6 +10,9 @@
 /* From then on a round must take this part off what is left, or the polishing ends. */
 #define LEAST_ROUNDS 4
 #define BETTER 0.9
+/* Deeper than this, in spacings, a part of the target has come between the places that the steps look at;
+ * shallower, polishing the frame alone is enough and the motion is left in peace. */
+#define ENTERED 0.02
 /* Rounds with contact by exact distances, which cost a tree search per element. */
 #define EXACT_ROUNDS 6
 /* Of lengths, posts, panels and angles at x. */
@@ -57,6 +60,8 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
     for (int round = 0;; round++) {
         morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
         if (exact) v.clearance = morph_blanket_depth_exact(b, x);
+        if (exact && round == 0)
+            b->entered = v.clearance > ENTERED * b->structure->spacing;
         if (held(b, &v) || round == rounds) return v;
         /* What does not get better cannot be met: contradicting lengths, a target in the way of a limit. */
         const double spacing = b->structure->spacing;
@@ -87,5 +92,6 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     memcpy(b->push, b->spare_push, push);
     memcpy(b->angle, b->spare_angle, angle);
     memcpy(b->touch, b->spare_touch, touch);
+    if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }
