@@ -5,8 +5,9 @@
 #include <string.h>
 
 /* At rest: for REST_WINDOW sqrt(spacing / gravity), the time a joint takes to fall half a spacing four times
- * over, no joint is faster than REST_SPEED sqrt(gravity spacing): it would then creep less than 1e-2 spacings
- * in that window, far below the gaps (0.1 spacings and more) that the end pose is judged by. */
+ * over, no joint leaves a ball of REST_SPEED sqrt(gravity spacing) times that, 2e-2 spacings: far below the
+ * gaps (0.1 spacings and more) that the end pose is judged by. A contact's trembling in place is no motion.
+ */
 #define REST_SPEED 5e-3
 #define REST_WINDOW 4.0
 /* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
@@ -166,12 +167,16 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
     return MORPH_OK;
 }
 
-/* Mean over the frame of the fastest joint: a contact's trembling within it is no motion. */
-static double frame_speed(const morph_blanket_state *b) {
+static double farthest(const morph_blanket_state *b, const double *from) {
     double most = 0.0;
     for (int j = 0; j < b->joints; j++)
-        most = fmax(most, morph_dist(&b->x[3 * j], &b->keep_x[3 * j]));
-    return most / b->def.frame;
+        most = fmax(most, morph_dist(&b->x[3 * j], &from[3 * j]));
+    return most;
+}
+
+/* Mean over the frame of the fastest joint. */
+static double frame_speed(const morph_blanket_state *b) {
+    return farthest(b, b->keep_x) / b->def.frame;
 }
 
 /* The target is in the blanket because something holds that against it: the limit that is pushed hardest. */
@@ -272,6 +277,7 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     const double window = scale > 0.0 ? REST_WINDOW * sqrt(s->spacing / scale) : 0.0;
     int steps = steps_per_frame(s, &b->def);
     double calm = 0.0;
+    memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
     if (b->def.drive) morph_blanket_schedule(b);
     morph_blanket_polish(b, b->x);
     morph_blanket_accelerations(b);
@@ -282,7 +288,11 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
         const morph_status status = record_next(b, &steps, t, report);
         if (status != MORPH_OK) return status;
         morph_progress(control, b->def.drive ? "replay" : "nominal", (double)t->frames / frames);
-        calm = report->rest_speed <= speed && !driven(b) ? calm + b->def.frame : 0.0;
+        calm += b->def.frame;
+        if (driven(b) || farthest(b, b->rest_x) > speed * window) {
+            memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
+            calm = 0.0;
+        }
         report->at_rest = calm > 0.0 && calm >= window;
         if (report->at_rest) break;
     }

@@ -102,6 +102,7 @@ typedef struct morph_blanket_state {
     double *a;               /* acceleration at x by springs and gravity */
     double *before;          /* x at the step's start */
     double *keep_x, *keep_v; /* for a second try with a smaller step */
+    double *rest_x;          /* where the ball of rest has its middle */
     double (*bound)[2];      /* links: the limits that hold: the structure's, or the prescribed lengths */
     double (*limit)[2];      /* links: what the projection aims at, a little inside */
     double (*push)[2];       /* links: accumulated corrections of this step at the two limits */

@@ -60,8 +60,7 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
     for (int round = 0;; round++) {
         morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
         if (exact) v.clearance = morph_blanket_depth_exact(b, x);
-        if (exact && round == 0)
-            b->entered = v.clearance > ENTERED * b->structure->spacing;
+        if (exact && round == 0) b->entered = v.clearance > ENTERED * b->structure->spacing;
         if (held(b, &v) || round == rounds) return v;
         /* What does not get better cannot be met: contradicting lengths, a target in the way of a limit. */
         const double spacing = b->structure->spacing;

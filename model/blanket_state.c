@@ -35,7 +35,8 @@ static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
 
 static morph_status allocate(morph_blanket_state *b) {
     const size_t n = 3 * (size_t)b->joints;
-    double **const arrays[] = {&b->x, &b->v, &b->a, &b->before, &b->keep_x, &b->keep_v, &b->spare_x};
+    double **const arrays[] = {&b->x,      &b->v,      &b->a,       &b->before,
+                               &b->keep_x, &b->keep_v, &b->spare_x, &b->rest_x};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         if (!(*arrays[k] = morph_alloc(n, sizeof(double)))) return MORPH_ERR_NOMEM;
     if (!(b->weight = morph_alloc((size_t)b->joints, sizeof(double)))) return MORPH_ERR_NOMEM;
@@ -85,7 +86,7 @@ morph_status morph_blanket_state_create(const morph_structure *s, const morph_sd
 
 void morph_blanket_state_destroy(morph_blanket_state *b) {
     if (!b) return;
-    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v, b->spare_x};
+    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v, b->spare_x, b->rest_x};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         free(arrays[k]);
     free(b->weight);
