@@ -116,8 +116,8 @@ static inline void measure_frame(const world *w, const double *x, double lift, f
     measure_depth(w, x, lift, f);
 }
 
-/* Runs; MORPH_OK is asserted. */
-static inline figures run_world(const world *w, const char *name) {
+/* Runs; MORPH_OK is asserted. The trajectory is the caller's to free. */
+static inline figures run_kept(const world *w, const char *name, morph_trajectory *kept) {
     morph_trajectory t;
     figures f = {.finite = true, .lowest = INFINITY};
     const double begin = cpu_seconds();
@@ -133,11 +133,18 @@ static inline figures run_world(const world *w, const char *name) {
         for (int j = 0; j < t.joints && k > 0; j++)
             f.fastest = fmax(f.fastest, morph_dist(&x[3 * j], &x[3 * j - 3 * t.joints]) / w->def.frame);
     }
-    morph_trajectory_free(&t);
+    *kept = t;
     print_message(
         "%-34s length %7.1e post %7.1e angle %5.2f depth %8.1e fastest %8.2e; %d steps, %d "
         "halvings, %.2f s\n",
         name, f.length, f.post, f.angle, f.depth, f.fastest, f.report.steps, f.report.step_halvings, seconds);
+    return f;
+}
+
+static inline figures run_world(const world *w, const char *name) {
+    morph_trajectory t;
+    const figures f = run_kept(w, name, &t);
+    morph_trajectory_free(&t);
     return f;
 }
 

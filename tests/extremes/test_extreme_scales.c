@@ -5,9 +5,9 @@
 /* A ball of 0.9 spacings whose top is at z = 0, under a sheet a fiftieth of a spacing above its link's radius
  * that is on its way down. */
 static void ball_world(world *w, const morph_structure_def *def) {
-    make_sphere(3);
+    make_sphere(2);
     scale_made(0.9 * def->spacing, -0.9 * def->spacing);
-    make_world(w, def, true, 0.06, 0.0);
+    make_world(w, def, true, 0.06, 0.125);
     w->def.velocity[2] = -0.5 * sqrt(9.81 * def->spacing);
 }
 
@@ -21,7 +21,7 @@ static void strain(world *w) {
 static void set_time(world *w) {
     const morph_structure_def *d = &w->s->def;
     const double fall = sqrt(d->spacing / 9.81), stiff = sqrt(d->mass / (12.0 * d->stiffness));
-    w->def.time = fmin(4.0 * fall, 1500.0 * stiff);
+    w->def.time = fmin(4.0 * fall, 1000.0 * stiff);
     w->def.frame = w->def.time / 20.0;
 }
 
@@ -94,7 +94,7 @@ static void test_steps(void **state) {
         ball_world(&w, &def);
         strain(&w);
         w.def.step = steps[n];
-        w.def.time = fmin(0.5, 8e3 * steps[n]);
+        w.def.time = fmin(0.5, 4e3 * steps[n]);
         w.def.frame = w.def.time / 10.0;
         char name[64];
         snprintf(name, sizeof name, "step %.0e s", steps[n]);
