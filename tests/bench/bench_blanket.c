@@ -105,7 +105,10 @@ static bool make_target(scene *s, double radius) {
             lo[i % 3] = fmin(lo[i % 3], s->start[i] - a);
             hi[i % 3] = fmax(hi[i % 3], s->start[i] + a);
         }
-    return morph_sdf_create(s->exact, lo, hi, a / 8.0, NULL, &s->sdf) == MORPH_OK;
+    /* 1/8 of the spacing as in plans; larger sheets on larger balls need no such field, nor the memory for
+     * it. */
+    const double cell = radius > 5.0 * a ? a / 2.0 : a / 8.0;
+    return morph_sdf_create(s->exact, lo, hi, cell, NULL, &s->sdf) == MORPH_OK;
 }
 
 static bool make(scene *s, int nodes, morph_joint_type joints) {

@@ -41,7 +41,7 @@ static result run_blanket(int nodes, double time) {
     for (int i = 0; i < mesh.vertices; i++)
         mesh.v[3 * i + 2] += r;
     good = good && morph_distance_create(&mesh, true, &exact) == MORPH_OK &&
-           morph_sdf_create(exact, lo, hi, 0.1 / 8.0, nullptr, &sdf) == MORPH_OK &&
+           morph_sdf_create(exact, lo, hi, nodes > 32 ? 0.05 : 0.0125, nullptr, &sdf) == MORPH_OK &&
            (start = static_cast<double *>(morph_alloc(3 * static_cast<size_t>(s->joints), sizeof *start)));
     if (good) {
         for (int i = 0; i < 3 * s->joints; i++)
