@@ -312,6 +312,7 @@ int main(int arguments, char **argument) {
     const double seconds = arguments > 1 ? atof(argument[1]) : 2.0;
     double last[2] = {0.0};
     morph_blas_threads(1);
+    setvbuf(stdout, NULL, _IOLBF, 0);
     printf("over a ball, %g s at most, frames of 0.02 s held to exact distances\n", seconds);
     size_row(4, seconds, last);
     size_row(16, seconds, last);
