@@ -20,6 +20,10 @@
  * What moves further is not safely followed along its way. */
 #define PLANNED_MOVE 0.1
 #define MOST_MOVE 0.25
+/* What would move further than FAST spacings in the step that forces ask for is planned for FAST_MOVE: half a
+ * link's usual radius, with which even an edge without thickness does not cut the skin. */
+#define FAST 0.15
+#define FAST_MOVE 0.02
 /* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
  * angle): half a degree, what the falling blanket's own frames keep. */
 #define ANGLE_GIVES 0.01
@@ -134,7 +138,9 @@ static int steps_for_speed(const morph_blanket_state *b, int steps) {
     double fastest = 0.0;
     for (int k = 0; k < 3 * b->joints; k++)
         fastest = fmax(fastest, fabs(b->v[k]));
-    const double most = b->def.frame * fastest / (PLANNED_MOVE * b->structure->spacing);
+    const double spacing = b->structure->spacing;
+    const bool fast = b->sdf && fastest * good_step(b->structure, &b->def) > FAST * spacing;
+    const double most = b->def.frame * fastest / ((fast ? FAST_MOVE : PLANNED_MOVE) * spacing);
     return (int)fmin(fmax(steps, ceil(most)), MOST_STEPS);
 }
 

@@ -40,7 +40,8 @@ typedef struct morph_contact {
 /* Angle between u and v as floor <= cos <= ceiling; joint[k] enters u with su[k] and v with sv[k]. */
 typedef struct morph_angle {
     int joint[4], joints;
-    int far[2]; /* where the arms end */
+    int u[2], v[2]; /* an arm leads from its first joint to its second */
+    int far[2];     /* where the arms end */
     double su[4], sv[4];
     double weight[4];       /* of its joints */
     double floor, ceiling;  /* aimed at, a little inside */
