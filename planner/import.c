@@ -323,8 +323,7 @@ morph_status morph_target_tetra(const morph_target_def *def, morph_tetra *out, c
                                      def->file_as_written ? def->file_as_written : def->file};
     morph_tetra_report found;
     morph_mesh_report unused = {0};
-    morph_status status =
-        morph_import_tetra(def->file, sentence.name, out, &found, message, message_size);
+    morph_status status = morph_import_tetra(def->file, sentence.name, out, &found, message, message_size);
     if (status != MORPH_OK) return status;
     /* Only vertices are moved; all lie within the surface's box. */
     morph_mesh vertices = {.vertices = out->vertices, .v = out->v};

@@ -17,10 +17,11 @@
 #define FRAME 0.01 /* of the blanket, s */
 
 static morph_status too_thin(double cell, char *message, size_t size) {
-    snprintf(message, size,
-             "the target's inside cannot be filled with tetrahedra of %.3g m: it must be thicker, or a file of "
-             "tetrahedra (.msh, .node with .ele); without deformable it is rigid",
-             cell);
+    snprintf(
+        message, size,
+        "the target's inside cannot be filled with tetrahedra of %.3g m: it must be thicker, or a file of "
+        "tetrahedra (.msh, .node with .ele); without deformable it is rigid",
+        cell);
     return MORPH_ERR_INPUT;
 }
 
@@ -82,10 +83,11 @@ morph_status morph_target_body(const morph_scene *scene, const morph_distance *e
     if (status != MORPH_OK) return status;
     const double substeps = FRAME / morph_body_stable_step(*out);
     if (substeps <= MOST_SUBSTEPS) return MORPH_OK;
-    snprintf(message, message_size,
-             "a young of %.3g Pa at a density of %.3g kg/m3 asks for %.1g steps in each frame of the blanket, "
-             "allowed: %.0g; without deformable the target is rigid",
-             def.young, def.density, substeps, MOST_SUBSTEPS);
+    snprintf(
+        message, message_size,
+        "a young of %.3g Pa at a density of %.3g kg/m3 asks for %.1g steps in each frame of the blanket, "
+        "allowed: %.0g; without deformable the target is rigid",
+        def.young, def.density, substeps, MOST_SUBSTEPS);
     morph_body_destroy(*out);
     *out = NULL;
     return MORPH_ERR_INPUT;

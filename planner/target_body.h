@@ -20,11 +20,11 @@ typedef struct morph_deformable_report {
 morph_status morph_target_tetra(const morph_target_def *def, morph_tetra *out, char *message,
                                 size_t message_size);
 
-/* The body of a scene with a deformable target, at rest in its place, held by its foot: vertices in the lowest
- * tenth of its height. From a file of tetrahedra these, otherwise the target's inside (exact: the distance to
- * its surface) is filled with ones of about half a spacing, finer where that loses a twentieth of its volume.
- * Fills the counts and the volume of *report. MORPH_ERR_INPUT, with one sentence in message, where the target
- * cannot be filled or is too stiff to be followed. */
+/* The body of a scene with a deformable target, at rest in its place, held by its foot: vertices in the
+ * lowest tenth of its height. From a file of tetrahedra these, otherwise the target's inside (exact: the
+ * distance to its surface) is filled with ones of about half a spacing, finer where that loses a twentieth of
+ * its volume. Fills the counts and the volume of *report. MORPH_ERR_INPUT, with one sentence in message,
+ * where the target cannot be filled or is too stiff to be followed. */
 morph_status morph_target_body(const morph_scene *scene, const morph_distance *exact, morph_body **out,
                                morph_deformable_report *report, char *message, size_t message_size);
 

@@ -62,6 +62,22 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
     return MORPH_OK;
 }
 
+morph_status morph_workspace_press(morph_workspace *w, const morph_scene *scene, const morph_mesh *surface,
+                                   const morph_control *control) {
+    morph_scene pressed = *scene; /* borrows; only its target differs */
+    morph_workspace fresh;
+    pressed.target = *surface;
+    morph_status status = morph_mesh_examine(surface, &pressed.target_report);
+    if (status == MORPH_OK) status = morph_workspace_create(&pressed, control, &fresh);
+    if (status != MORPH_OK) return status;
+    double *start = fresh.start;
+    fresh.start = w->start;
+    w->start = start;
+    morph_workspace_free(w);
+    *w = fresh;
+    return MORPH_OK;
+}
+
 void morph_workspace_free(morph_workspace *w) {
     morph_cavity_destroy(w->cavity);
     morph_sdf_destroy(w->sdf);
