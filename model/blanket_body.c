@@ -140,6 +140,10 @@ bool morph_blanket_soft_step(morph_blanket_state *b) {
         if (body->inverse[i] == 0.0) body->v[3 * i + 2] = rise / b->step;
     if (moves) body->def.base = soft->base + b->lift_to;
     if (!morph_body_step(body, b->step, NULL)) return false;
+    /* Drag is not for what the lift carries. */
+    for (int i = 0; i < body->vertices && moves; i++)
+        if (body->inverse[i] == 0.0)
+            body->x[3 * i + 2] = body->predicted[3 * i + 2] = body->start[3 * i + 2] + rise;
     if (moves) b->work += fmax(0.0, whole_energy(body) - energy);
     return true;
 }
@@ -211,6 +215,10 @@ void morph_blanket_soft_keep(morph_blanket_state *b) {
 
 void morph_blanket_soft_forget(morph_blanket_state *b) {
     memset(b->soft->hold, 0, (size_t)b->soft->sources * sizeof *b->soft->hold);
+}
+
+void morph_blanket_soft_force(const morph_blanket_state *b, double force[3]) {
+    morph_body_contacts_force(b->soft->contacts, b->step, force);
 }
 
 /* ---- a frame ---- */

@@ -85,19 +85,28 @@ static void note_held_up(planner *p) {
 /* What the blanket has made of the target: later stages see that, as a rigid one. */
 static morph_status press(planner *p, const morph_body *body) {
     morph_summary *s = &p->plan->summary;
+    const double lift = p->nominal.lift[p->nominal.frames - 1];
     morph_mesh surface;
     morph_status status = morph_tetra_surface(&body->mesh, body->x, &surface);
+    for (int i = 0; i < surface.vertices; i++)
+        surface.v[3 * i + 2] -= lift; /* to the target's place, as the target's own vertices stand */
     if (status == MORPH_OK) status = morph_record_deformed(&p->plan->record, &surface);
     if (status == MORPH_OK) status = morph_workspace_press(&p->work, p->scene, &surface, &p->quiet);
     morph_mesh_free(&surface);
-    s->deformable.pressed = morph_target_pressed(body);
+    s->deformable.pressed = morph_target_pressed(body, lift);
     s->deformable.least_volume = morph_body_least_volume(body);
     s->deformable.worst_depth = s->blanket_report.worst_clearance;
-    snprintf(s->warning, sizeof s->warning,
-             "the target is deformable: it is pressed by up to %.3g m; gap, cavity and coverage are to its "
-             "pressed surface, clearance is to that and at the end only, as it gives way before",
-             s->deformable.pressed);
     return status;
+}
+
+/* Beside what else there is to say. */
+static void note_deformable(planner *p) {
+    morph_summary *s = &p->plan->summary;
+    const size_t used = strlen(s->warning);
+    snprintf(s->warning + used, sizeof s->warning - used,
+             "%sthe target is deformable: it is pressed by up to %.3g m; gap, cavity and coverage are to its "
+             "pressed surface, clearance is to that and at the end only, as it gives way before",
+             used > 0 ? "; " : "", s->deformable.pressed);
 }
 
 /* The pure blanket on a deformable target: both move. */
@@ -142,6 +151,7 @@ static morph_status stage_nominal(planner *p) {
         s->has_blanket = status == MORPH_OK;
     }
     if (status == MORPH_OK && s->blanket_report.held_up) note_held_up(p);
+    if (status == MORPH_OK && s->deformable.used) note_deformable(p);
     note_time(p, MORPH_STAGE_NOMINAL, since);
     return status;
 }

@@ -107,7 +107,8 @@ const morph_dataset morph_record_datasets[] = {
     INTS("target/triangles", target_t, TRIANGLES, 3, OF(VERTICES), OF(VERTICES), "1",
          "triangles of the target, outward"),
     REAL2("deformed/vertices", deformed_v, PRESSED, -1, 3, false, "m",
-          "vertices of a deformable target's surface as the pure blanket has pressed it at its end"),
+          "vertices of a deformable target's surface as the pure blanket has pressed it at its end, the "
+          "target in its place"),
     {"deformed/triangles",
      AT(deformed_t),
      MORPH_CELL_INT,

@@ -87,7 +87,7 @@ void morph_scene_destroy(morph_scene *scene); /* NULL allowed */
 
 /* Can `method` ("ipopt", "blanket") plan this scene? If not, text names the first feature that it does not
  * support, "not available yet: motion.mode: rise with --method ipopt"; else text is "". The blanket runs
- * every scene that can be read but a deformable target that rises. */
+ * every scene that can be read. */
 bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size);
 
 /* The scene with every default written out, as YAML text (free with free()). mesh_file: what to write as

@@ -30,10 +30,6 @@ static bool beyond_refinement(const morph_scene *scene, char *text, size_t size)
 bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size) {
     char feature[96];
     if (size > 0) text[0] = '\0';
-    if (scene->target_def.has_deformable && scene->motion.mode == MORPH_MODE_RISE) {
-        snprintf(text, size, "not available yet: motion.mode: rise with target.deformable");
-        return false;
-    }
     if (strcmp(method, "blanket") == 0 || !beyond_refinement(scene, feature, sizeof feature)) return true;
     snprintf(text, size, "not available yet: %s with --method %s", feature, method);
     return false;

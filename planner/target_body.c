@@ -10,8 +10,9 @@
 /* The volume that tetrahedra may miss before they are made finer, and how often. */
 #define VOLUME_LOST 0.05
 #define FINER 3
-/* Cells in the target's volume to start with, at most; some ten tetrahedra each. More take minutes to run. */
-#define MOST_CELLS 2000.0
+/* Cells in the target's volume to start with, at most; some ten tetrahedra each. With 10,000 of them a run
+ * takes half a minute. */
+#define MOST_CELLS 1000.0
 /* Of the body in a frame of the blanket; beyond, the run would take hours. */
 #define MOST_SUBSTEPS 1e6
 #define FRAME 0.01 /* of the blanket, s */
@@ -93,11 +94,12 @@ morph_status morph_target_body(const morph_scene *scene, const morph_distance *e
     return MORPH_ERR_INPUT;
 }
 
-double morph_target_pressed(const morph_body *body) {
+double morph_target_pressed(const morph_body *body, double lift) {
     double most = 0.0;
     for (int k = 0; k < body->mesh.surface_vertices; k++) {
         const int i = body->mesh.surface[k];
-        most = fmax(most, morph_dist(&body->x[3 * i], &body->mesh.v[3 * i]));
+        const double at[3] = {body->x[3 * i], body->x[3 * i + 1], body->x[3 * i + 2] - lift};
+        most = fmax(most, morph_dist(at, &body->mesh.v[3 * i]));
     }
     return most;
 }

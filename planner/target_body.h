@@ -28,7 +28,7 @@ morph_status morph_target_tetra(const morph_target_def *def, morph_tetra *out, c
 morph_status morph_target_body(const morph_scene *scene, const morph_distance *exact, morph_body **out,
                                morph_deformable_report *report, char *message, size_t message_size);
 
-/* Largest displacement of a vertex of the surface from the body's rest shape, m. */
-double morph_target_pressed(const morph_body *body);
+/* Largest displacement of a vertex of the surface from the body's rest shape at this lift, m. */
+double morph_target_pressed(const morph_body *body, double lift);
 
 #endif
