@@ -217,6 +217,10 @@ void morph_blanket_soft_forget(morph_blanket_state *b) {
     memset(b->soft->hold, 0, (size_t)b->soft->sources * sizeof *b->soft->hold);
 }
 
+int morph_blanket_soft_contacts(const morph_blanket_state *b) {
+    return morph_body_contacts_count(b->soft->contacts);
+}
+
 void morph_blanket_soft_force(const morph_blanket_state *b, double force[3]) {
     morph_body_contacts_force(b->soft->contacts, b->step, force);
 }

@@ -239,6 +239,7 @@ double morph_blanket_soft_frame_move(const morph_blanket_state *b);
 /* Added to what is there, J; any may be NULL. */
 void morph_blanket_soft_energies(const morph_blanket_state *b, double *kinetic, double *spring,
                                  double *height);
+int morph_blanket_soft_contacts(const morph_blanket_state *b); /* listed in the last step */
 /* Force of the body on the blanket in the last step, N. */
 void morph_blanket_soft_force(const morph_blanket_state *b, double force[3]);
 /* What failed in a step or a frame that cannot say so itself; MORPH_OK otherwise. */

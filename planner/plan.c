@@ -30,15 +30,19 @@ static void note_time(planner *p, morph_stage stage, double since) {
     p->plan->summary.seconds[stage] += morph_seconds() - since;
 }
 
+static void note_accuracy(planner *p) {
+    morph_summary *s = &p->plan->summary;
+    s->sdf_cell = p->work.accuracy.cell;
+    s->sdf_rms = p->work.accuracy.rms;
+    s->sdf_max = p->work.accuracy.max;
+}
+
 static morph_status stage_target(planner *p) {
     const double since = morph_seconds();
-    morph_summary *s = &p->plan->summary;
     morph_progress(control_of(p), "target", 0.0);
     morph_status status = morph_workspace_create(p->scene, control_of(p), &p->work);
     if (status == MORPH_OK) {
-        s->sdf_cell = p->work.accuracy.cell;
-        s->sdf_rms = p->work.accuracy.rms;
-        s->sdf_max = p->work.accuracy.max;
+        note_accuracy(p);
         status =
             morph_record_structure(&p->plan->record, p->work.structure, &p->scene->target, p->scene->base);
     }
@@ -93,6 +97,7 @@ static morph_status press(planner *p, const morph_body *body) {
     if (status == MORPH_OK) status = morph_record_deformed(&p->plan->record, &surface);
     if (status == MORPH_OK) status = morph_workspace_press(&p->work, p->scene, &surface, &p->quiet);
     morph_mesh_free(&surface);
+    note_accuracy(p);
     s->deformable.pressed = morph_target_pressed(body, lift);
     s->deformable.least_volume = morph_body_least_volume(body);
     s->deformable.worst_depth = s->blanket_report.worst_clearance;

@@ -30,7 +30,7 @@ void morph_plan_destroy(morph_plan *plan);
 typedef struct morph_workspace {
     morph_structure *structure;
     morph_distance *exact;
-    morph_sdf *sdf;
+    morph_sdf *sdf; /* NULL for a deformable target, until it is pressed */
     morph_cavity *cavity;
     morph_world world;
     double *start; /* 3*joints: flat, at the drop height above the target or in its frame */

@@ -17,7 +17,7 @@
 #include <cmocka.h>
 
 #define SHEET "morphplan: 1\nstructure: {nodes: [3, 3], spacing: 0.1, link: {stiffness: 20}}\n"
-#define REST "motion: {friction: 0.4, time: 1.0}\nschedule: {sample: 0.01}\n"
+#define REST "motion: {friction: 0.4, time: 0.6}\nschedule: {sample: 0.01}\n"
 
 static char folder[64];
 
@@ -148,17 +148,17 @@ static void test_ball(void **state) {
     (void)state;
     morph_scene *scene = scene_of(
         SHEET "target: {shape: sphere, radius: 0.08, deformable: {young: 2.0e4, density: 300}}\n" REST);
-    morph_plan *plan = run(scene), *again = run(scene);
+    morph_plan *plan = run(scene);
     assert_pressed(plan);
     assert_true(plan->summary.blanket.coverage > 0.5);
-    const size_t n = 3 * (size_t)plan->record.deformed_vertices;
-    assert_memory_equal(plan->record.deformed_v, again->record.deformed_v, n * sizeof(double));
     assert_folder(scene, plan);
     morph_plan_destroy(plan);
-    morph_plan_destroy(again);
     morph_scene_destroy(scene);
     /* The rigid one has none of it. */
-    scene = scene_of(SHEET "target: {shape: sphere, radius: 0.08}\n" REST);
+    scene = scene_of(
+        "morphplan: 1\nstructure: {nodes: [2, 2], spacing: 0.1, link: {stiffness: 20}}\n"
+        "target: {shape: box, size: [0.05, 0.05, 0.04]}\n"
+        "motion: {time: 0.3}\nschedule: {sample: 0.01}\n");
     plan = run(scene);
     assert_false(plan->summary.deformable.used);
     assert_null(plan->record.deformed_v);
@@ -174,7 +174,7 @@ static void test_rise(void **state) {
         "morphplan: 1\n"
         "structure: {nodes: [4, 4], spacing: 0.1, fixed: corners, support: frame, link: {stiffness: 20}}\n"
         "target: {shape: sphere, radius: 0.09, at: [0, 0, -0.05], deformable: {young: 2.0e4, density: 300}}\n"
-        "motion: {mode: rise, height: 0.06, friction: 0.4, time: 1.5}\nschedule: {sample: 0.01}\n");
+        "motion: {mode: rise, height: 0.06, friction: 0.4, time: 1.0}\nschedule: {sample: 0.01}\n");
     morph_plan *plan = run(scene);
     assert_pressed(plan);
     assert_true(plan->record.offset_nominal[2] == -0.06);
