@@ -105,6 +105,7 @@ static frame_start keep_frame(morph_blanket_state *b) {
     const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
     memcpy(b->keep_x, b->x, bytes);
     memcpy(b->keep_v, b->v, bytes);
+    if (b->soft) morph_blanket_soft_keep_frame(b);
     return (frame_start){b->time, b->lift, b->rise_clock, allowed_energy(b)};
 }
 
@@ -115,6 +116,7 @@ static void rewind_frame(morph_blanket_state *b, const frame_start *at) {
     b->time = at->time;
     b->lift = b->lift_to = at->lift;
     b->rise_clock = at->rise_clock;
+    if (b->soft) morph_blanket_soft_rewind_frame(b);
     morph_blanket_accelerations(b);
     morph_blanket_forget(b);
 }
@@ -167,6 +169,7 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
         b->most_move = INFINITY;
         if (!advance(b, now, INFINITY)) return MORPH_ERR_NONFINITE;
         memset(b->v, 0, 3 * (size_t)b->joints * sizeof(double));
+        if (b->soft) morph_blanket_soft_stop(b);
     }
     report->steps += now;
     report->step = b->step;
@@ -180,9 +183,10 @@ static double farthest(const morph_blanket_state *b, const double *from) {
     return most;
 }
 
-/* Mean over the frame of the fastest joint. */
+/* Mean over the frame of what moved fastest. */
 static double frame_speed(const morph_blanket_state *b) {
-    return farthest(b, b->keep_x) / b->def.frame;
+    const double soft = b->soft ? morph_blanket_soft_frame_move(b) : 0.0;
+    return fmax(soft, farthest(b, b->keep_x)) / b->def.frame;
 }
 
 /* The target is in the blanket because something holds that against it: the limit that is pushed hardest. */
@@ -291,11 +295,14 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     note_worst(report, &v);
     while (t->frames < frames) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
-        const morph_status status = record_next(b, &steps, t, report);
+        morph_status status = record_next(b, &steps, t, report);
+        if (status == MORPH_OK && b->soft) status = morph_blanket_soft_status(b);
         if (status != MORPH_OK) return status;
         morph_progress(control, b->def.drive ? "replay" : "nominal", (double)t->frames / frames);
         calm += b->def.frame;
-        if (driven(b) || farthest(b, b->rest_x) > speed * window) {
+        /* A deformable target must be slow too; the blanket may tremble in place. */
+        const bool soft_moves = b->soft && morph_blanket_soft_frame_move(b) > speed * b->def.frame;
+        if (driven(b) || soft_moves || farthest(b, b->rest_x) > speed * window) {
             memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
             calm = 0.0;
         }
@@ -315,7 +322,7 @@ morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf
     morph_blanket_state *b;
     morph_status status = morph_blanket_state_create(structure, sdf, def, x0, &b);
     if (status != MORPH_OK) return status;
-    b->exact = exact;
+    if (!def->body) b->exact = exact;
     /* A frame more where the time is no whole number of them: the last then lies beyond it. */
     const double frames = ceil(def->time / def->frame * (1.0 - 1e-12)) + 1.0;
     if (!(frames <= MOST_FRAMES) || steps_per_frame(structure, def) == 0)

@@ -224,6 +224,7 @@ void morph_blanket_forget(morph_blanket_state *b) {
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
     morph_blanket_self_forget(b->self);
+    if (b->soft) morph_blanket_soft_forget(b);
 }
 
 double morph_blanket_moved(const morph_blanket_state *b, const double *x) {
@@ -242,9 +243,11 @@ void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
     for (int t = 0; t < b->touches; t++)
         find_target(b, &b->touch[t], x, move);
     if (!isnan(b->def.base)) find_base(b, x, move);
+    if (b->soft) morph_blanket_soft_find(b, x, NEAR * b->structure->spacing + move);
 }
 
 void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
+    if (b->soft) morph_blanket_soft_renew(b);
     for (int k = 0; k < b->contacts; k++) {
         morph_contact *c = &b->contact[k];
         if (c->radius >= 0.0 && c->push > 0.0) set_plane(b, c, x, c->radius);
@@ -302,6 +305,7 @@ void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm
         set_drag(c, want, b->def.friction, change);
         move_corners(c, x, change);
     }
+    if (b->soft && warm > 0.0) morph_blanket_soft_start(b, x, warm, most);
 }
 
 void morph_blanket_keep_contacts(morph_blanket_state *b) {
@@ -311,6 +315,7 @@ void morph_blanket_keep_contacts(morph_blanket_state *b) {
         b->hold[c->source].push = c->push;
         memcpy(b->hold[c->source].drag, c->drag, sizeof c->drag);
     }
+    if (b->soft) morph_blanket_soft_keep(b);
 }
 
 static double base_depth(const morph_blanket_state *b, const double *x) {

@@ -86,8 +86,10 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     memcpy(b->spare_angle, b->angle, angle);
     memcpy(b->spare_touch, b->touch, touch);
     memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
+    if (b->soft) morph_blanket_soft_hold(b);
     morph_violation v = polish(b, x, false, ROUNDS);
-    if (b->exact && b->sdf) v = polish(b, x, true, EXACT_ROUNDS);
+    if (b->exact && (b->sdf || b->soft)) v = polish(b, x, true, EXACT_ROUNDS);
+    if (b->soft) morph_blanket_soft_release(b);
     memcpy(b->push, b->spare_push, push);
     memcpy(b->angle, b->spare_angle, angle);
     memcpy(b->touch, b->spare_touch, touch);

@@ -366,5 +366,6 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, doubl
     morph_blanket_project_self(b, x, backward);
     for (int c = 0; c < b->contacts; c++)
         morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
+    if (b->soft) morph_blanket_soft_sweep(b, x, backward, friction);
     project_posts(b, x);
 }

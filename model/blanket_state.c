@@ -29,6 +29,7 @@ static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
                                  d->rise,    d->rise_time, d->softening, d->square};
     for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
         if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
+    if (d->body && !morph_body_finite(d->body)) return false;
     if (!finite3(d->velocity) || (d->rise > 0.0 && !(d->rise_time > 0.0)) || !arrays_ok(s, d)) return false;
     return isfinite(d->frame) && d->frame > 0.0 && (isnan(d->base) || isfinite(d->base));
 }
@@ -47,14 +48,15 @@ static morph_status allocate(morph_blanket_state *b) {
     morph_status status = morph_blanket_fix_create(b->structure, &b->fix);
     if (status == MORPH_OK) status = morph_blanket_self_create(b->structure, &b->self);
     if (status == MORPH_OK) status = morph_blanket_limits_create(b);
-    return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
+    if (status == MORPH_OK) status = morph_blanket_touches_create(b);
+    return status == MORPH_OK ? morph_blanket_soft_create(b) : status;
 }
 
 morph_status morph_blanket_state_create(const morph_structure *s, const morph_sdf *sdf,
                                         const morph_blanket_def *def, const double *x0,
                                         morph_blanket_state **out) {
     *out = NULL;
-    if (!def_ok(s, def)) return MORPH_ERR_INPUT;
+    if (!def_ok(s, def) || (def->body && sdf)) return MORPH_ERR_INPUT;
     for (int k = 0; k < 3 * s->joints; k++)
         if (!isfinite(x0[k])) return MORPH_ERR_NONFINITE;
     morph_blanket_state *b = morph_alloc(1, sizeof *b);
@@ -99,6 +101,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->angle);
     morph_blanket_fix_destroy(b->fix);
     morph_blanket_self_destroy(b->self);
+    morph_blanket_soft_destroy(b->soft);
     free(b->memo);
     free(b->touch);
     free(b->contact);
