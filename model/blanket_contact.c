@@ -25,6 +25,8 @@
 /* A seeking place moves to where the exact distance is deepest if that is deeper by this, spacings: places at
  * rest stay where they are. */
 #define SEEK_GAIN 5e-3
+/* A place's distance is taken anew when it has moved further than this, spacings. */
+#define KEEP_PLANE 1e-3
 
 static morph_touch *add_touch(morph_blanket_state *b, const int *joint, int corners, const double *weight,
                               double radius) {
@@ -89,6 +91,28 @@ static double distance_at(const morph_blanket_state *b, const double q[3], doubl
     return morph_sdf_eval(b->sdf, p, g, NULL);
 }
 
+/* The same by the plane through the last value of this place while it has hardly moved: with a radius of
+ * curvature of a spacing the plane is then off by KEEP_PLANE^2 / 2 spacings. */
+static bool has_moved(const morph_blanket_state *b, const morph_touch *t, const double q[3]) {
+    const double d[3] = {q[0] - t->at[0], q[1] - t->at[1], q[2] - b->lift_to - t->at[2]};
+    const double keep = KEEP_PLANE * b->structure->spacing;
+    return !t->known || morph_dot(d, d) > keep * keep;
+}
+
+static double distance_of(const morph_blanket_state *b, morph_touch *t, const double q[3], double *g) {
+    const double p[3] = {q[0], q[1], q[2] - b->lift_to};
+    double d[3];
+    morph_sub(p, t->at, d);
+    if (has_moved(b, t, q)) {
+        memcpy(t->at, p, sizeof t->at);
+        t->phi = morph_sdf_eval(b->sdf, p, t->gradient, NULL);
+        t->known = true;
+        d[0] = d[1] = d[2] = 0.0;
+    }
+    if (g) memcpy(g, t->gradient, sizeof t->gradient);
+    return t->phi + morph_dot(t->gradient, d);
+}
+
 static double extent_of(const morph_touch *t, const double *x) {
     double extent = 0.0;
     for (int j = 0; j < t->corners; j++)
@@ -124,7 +148,7 @@ static double seek(const morph_blanket_state *b, morph_touch *t, const double *x
 static bool set_plane(const morph_blanket_state *b, morph_contact *c, const double *x, double radius) {
     double q[3], g[3];
     place_of(x, c->joint, c->corners, c->weight, q);
-    const double phi = distance_at(b, q, g);
+    const double phi = distance_of(b, &b->touch[c->source], q, g);
     const double slope = morph_norm(g);
     if (!(slope > 1e-6)) return false; /* a ridge inside the target: neighbours will lead out */
     for (int k = 0; k < 3; k++)
@@ -187,7 +211,8 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     if (b->path + move < t->wake) return;
     double q[3];
     place_of(x, t->joint, t->corners, t->weight, q);
-    double gap = distance_at(b, q, NULL) - t->radius;
+    const bool moved = has_moved(b, t, q);
+    double gap = distance_of(b, t, q, NULL) - t->radius;
     const double near = NEAR * b->structure->spacing + move;
     const double reach = t->stride > 0.0 ? extent_of(t, x) : 0.0;
     const double spare = gap / MOST_SLOPE - reach - near;
@@ -195,7 +220,9 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
         t->wake = b->path - move + spare;
         return;
     }
-    if (t->stride > 0.0) gap = seek(b, t, x, gap + t->radius) - t->radius;
+    /* What rests has found its deepest place; exact distances look after it from frame to frame. */
+    if (t->stride > SHORTEST_STRIDE || (t->stride > 0.0 && moved))
+        gap = seek(b, t, x, gap + t->radius) - t->radius;
     if (gap > near) return;
     morph_contact *c = add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
     if (swept(b, c, x, t->radius) || set_plane(b, c, x, t->radius)) b->contacts++;
@@ -254,10 +281,11 @@ void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
     }
 }
 
-static void move_corners(const morph_contact *c, double *x, const double change[3]) {
+static double move_corners(const morph_contact *c, double *x, const double change[3]) {
     for (int j = 0; j < c->corners; j++)
         for (int k = 0; k < 3; k++)
             x[3 * c->joint[j] + k] += c->share[j] * change[k];
+    return morph_norm(change);
 }
 
 /* Sets the friction to `want` without its normal part, cut to the cone; returns the change in `change`. */
@@ -276,19 +304,19 @@ static void set_drag(morph_contact *c, const double want[3], double friction, do
 /* The place's centre q moves by weight_j times what joint j moves; joints move by weight_j times push, so q
  * by push / inverse. Normal: unilateral. Friction: undo the tangential motion since the step's start, by at
  * most friction times the normal push (Coulomb; sticking inside the cone, sliding on it). */
-void morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
+double morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
     double q[3], change[3], want[3];
     place_of(x, c->joint, c->corners, c->weight, q);
     const double gap = morph_dot(c->normal, q) - c->level;
     const double old = c->push;
     c->push = fmax(0.0, old - gap * c->inverse);
-    if (c->push == 0.0 && old == 0.0) return;
+    if (c->push == 0.0 && old == 0.0) return 0.0;
     for (int k = 0; k < 3; k++) {
         change[k] = (c->push - old) * c->normal[k];
         want[k] = c->drag[k] - (q[k] - c->before[k]) * c->inverse;
     }
     if (friction > 0.0) set_drag(c, want, friction, change);
-    move_corners(c, x, change);
+    return move_corners(c, x, change);
 }
 
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most) {

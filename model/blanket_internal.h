@@ -12,10 +12,13 @@
 /* A place on a joint (1 corner), a link (2) or a skin triangle (3) that may touch the target. */
 typedef struct morph_touch {
     int joint[3], corners;
-    double weight[3]; /* barycentric */
-    double radius;    /* m */
-    double wake;      /* path length (state.path) before which it cannot touch */
-    double stride;    /* of the search for the deepest place on the element; 0: the place is fixed */
+    double weight[3];        /* barycentric */
+    double radius;           /* m */
+    double wake;             /* path length (state.path) before which it cannot touch */
+    double stride;           /* of the search for the deepest place on the element; 0: the place is fixed */
+    double at[3];            /* where the target's distance was last taken, seen from the target */
+    double phi, gradient[3]; /* that distance and its gradient */
+    bool known;
 } morph_touch;
 
 /* What a contact's corrections came to in the last step. */
@@ -52,6 +55,8 @@ typedef struct morph_angle {
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
 #define MORPH_BLANKET_SWEEPS 12
+/* Sweeps end when none of their corrections moves a joint further, spacings: a fiftieth of those margins. */
+#define MORPH_BLANKET_SWEPT 2e-6
 
 /* What counts as held: lengths a tenth of a millionth part of what a link moves through, clearance what a
  * plan's clearance is checked to (spacings); panels what a plan's are checked to (sine), posts
@@ -97,6 +102,7 @@ typedef struct morph_blanket_state {
     double rise_clock;    /* s the target has risen for; stands when it is held up */
     bool held_up;
     double retreat;          /* of a target that was held up, m/s */
+    double changed;          /* largest motion by a correction in this sweep, m */
     double most_move;        /* m in a step */
     double work;             /* done on the blanket since the frame's start by what it does not store, J */
     double path;             /* sum over the steps of the fastest joint's motion, m */
@@ -192,7 +198,8 @@ void morph_blanket_self_destroy(morph_blanket_self *self); /* NULL allowed */
 void morph_blanket_self_forget(morph_blanket_self *self);
 /* Lists the pairs of links and posts that can meet while joints move by up to `move` from `before`. */
 morph_status morph_blanket_find_self(morph_blanket_state *b, double move);
-void morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward);
+/* Returns the longest motion that a correction gives a joint, m. */
+double morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward);
 int morph_blanket_self_count(const morph_blanket_state *b); /* contacts listed in the last step */
 
 /* blanket_contact.c */
@@ -218,7 +225,8 @@ void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
 /* Part of project_start; most: largest push to start with, m. */
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */
-void morph_blanket_project_contact(morph_contact *c, double *x, double friction);
+/* Returns the longest motion that the correction gives a joint, m. */
+double morph_blanket_project_contact(morph_contact *c, double *x, double friction);
 
 /* blanket_body.c: the deformable target. All but create and destroy need b->soft. */
 morph_status morph_blanket_soft_create(morph_blanket_state *b); /* does nothing without def.body */

@@ -79,6 +79,10 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     return MORPH_OK;
 }
 
+static void note(morph_blanket_state *b, double motion) {
+    b->changed = fmax(b->changed, fabs(motion));
+}
+
 /* Moves two joints apart by q d, each by its weight's share; two held ones stay. */
 static void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj, const double d[3],
                  double q) {
@@ -110,13 +114,14 @@ void morph_blanket_project_posts_along(morph_blanket_state *b) {
 }
 
 /* Posts share no joint, so this one is exact. */
-static void project_posts(const morph_blanket_state *b, double *x) {
+static void project_posts(morph_blanket_state *b, double *x) {
     const morph_structure *s = b->structure;
     for (int p = 0; p < b->posts; p++) {
         double *xb = &x[3 * s->post[p][0]], *xt = &x[3 * s->post[p][1]], d[3];
         morph_sub(xt, xb, d);
         const double length = morph_norm(d);
         if (!(length > 0.0)) continue;
+        note(b, s->post_length[p] - length);
         part(b, s->post[p], xb, xt, d, s->post_length[p] / length - 1.0);
     }
 }
@@ -137,6 +142,7 @@ static void project_length(morph_blanket_state *b, int l, double *x) {
     if (!(length > 0.0)) return;
     double grow = unilateral(&b->push[l][0], length - b->limit[l][0]);
     if (b->push[l][0] == 0.0) grow -= unilateral(&b->push[l][1], b->limit[l][1] - length);
+    note(b, grow);
     if (grow != 0.0) part(b, ends, xi, xj, d, grow / length);
 }
 
@@ -255,16 +261,17 @@ static void turn(const morph_angle *a, double *x, const double (*grad)[3], doubl
 
 /* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
  * the shorter arm. */
-static void project_angle(morph_angle *a, double *x) {
+static double project_angle(morph_angle *a, double *x) {
     double c, arm, grad[4][3];
     cosine(a, x, &c, NULL, NULL);
-    if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return;
+    if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return 0.0;
     const double square = cosine(a, x, &c, grad, &arm);
-    if (square == 0.0) return;
+    if (square == 0.0) return 0.0;
     const double most = 0.5 * arm / sqrt(square);
     double change = unilateral(&a->push[0], clip((c - a->floor) / square, most));
     if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) / square, most));
     turn(a, x, (const double(*)[3])grad, change);
+    return change * sqrt(square);
 }
 
 static void start_angle(morph_angle *a, double *x, double warm, double most) {
@@ -356,16 +363,19 @@ void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm)
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
  * angles yield where all cannot hold at once. */
 void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction) {
+    b->changed = 0.0;
     for (int t = 0; t < b->near_angles; t++)
-        project_angle(&b->angle[b->near_angle[backward ? b->near_angles - 1 - t : t]], x);
+        note(b, project_angle(&b->angle[b->near_angle[backward ? b->near_angles - 1 - t : t]], x));
     for (int l = 0; l < b->near_links; l++)
         project_length(b, b->near_link[backward ? b->near_links - 1 - l : l], x);
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
         project_panel(b, backward ? panels - 1 - p : p, x);
-    morph_blanket_project_self(b, x, backward);
+    /* Panels hang together and a deformable target has sweeps of its own: neither is done early. */
+    if (panels > 0 || b->soft) b->changed = INFINITY;
+    note(b, morph_blanket_project_self(b, x, backward));
     for (int c = 0; c < b->contacts; c++)
-        morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
+        note(b, morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction));
     if (b->soft) morph_blanket_soft_sweep(b, x, backward, friction);
     project_posts(b, x);
 }

@@ -157,8 +157,9 @@ morph_status morph_blanket_find_self(morph_blanket_state *b, double move) {
     return MORPH_OK;
 }
 
-void morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward) {
+double morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward) {
     morph_blanket_self *c = b->self;
+    double most = 0.0;
     for (int n = 0; n < c->contacts; n++) {
         self_contact *t = &c->contact[backward ? c->contacts - 1 - n : n];
         double gap = -t->least;
@@ -167,10 +168,12 @@ void morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward
         const double old = t->push;
         t->push = fmax(0.0, old - gap * t->inverse);
         const double change = t->push - old;
+        most = fmax(most, fabs(change));
         for (int k = 0; k < 4 && change != 0.0; k++)
             for (int m = 0; m < 3; m++)
                 x[3 * t->joint[k] + m] += change * t->weight[k] * b->weight[t->joint[k]] * t->normal[m];
     }
+    return most;
 }
 
 int morph_blanket_self_count(const morph_blanket_state *b) {
