@@ -29,6 +29,8 @@
 #define ANGLE_GIVES 0.01
 /* What a target that was held up draws back by in a frame that still breaks a limit, spacings. */
 #define RETREAT 0.02
+/* Then a little more each time the frame is done again, at most this often. */
+#define MOST_RETREATS 12
 
 /* Beyond these a run is not meant: 1e7 steps a frame would take hours. */
 #define MOST_STEPS 1e6
@@ -151,7 +153,7 @@ static int steps_for_speed(const morph_blanket_state *b, int steps) {
 static morph_status next_frame(morph_blanket_state *b, const frame_start *at, int *steps,
                                morph_blanket_report *report) {
     const int first = steps_for_speed(b, *steps);
-    const double least = LEAST_STEP * fmin(good_step(b->structure, &b->def), b->def.frame / first);
+    const double least = LEAST_STEP * fmin(b->good_step, b->def.frame / first);
     int now = first;
     b->most_move = MOST_MOVE * b->structure->spacing;
     bool good = advance(b, now, at->allowed);
@@ -250,7 +252,7 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
     if (status != MORPH_OK) return status;
     morph_violation v = record(b, time, t);
     morph_blanket_report cause;
-    if ((rose || b->held_up) && refused(b, &v, &cause)) {
+    for (int tries = 0; tries < MOST_RETREATS && (rose || b->held_up) && refused(b, &v, &cause); tries++) {
         t->frames--;
         rewind_frame(b, &at);
         if (!b->held_up) {
@@ -258,7 +260,7 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
             report->held_by = cause.held_by;
             report->held_element = cause.held_element;
         } else
-            b->retreat = RETREAT * b->structure->spacing / b->def.frame;
+            b->retreat += RETREAT * b->structure->spacing / b->def.frame;
         b->held_up = report->held_up = true;
         status = next_frame(b, &at, steps, report);
         if (status != MORPH_OK) return status;
@@ -286,6 +288,7 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     const double speed = REST_SPEED * sqrt(scale * s->spacing);
     const double window = scale > 0.0 ? REST_WINDOW * sqrt(s->spacing / scale) : 0.0;
     int steps = steps_per_frame(s, &b->def);
+    b->good_step = good_step(s, &b->def);
     double calm = 0.0;
     memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
     if (b->def.drive) morph_blanket_schedule(b);

@@ -155,6 +155,11 @@ static bool set_plane(const morph_blanket_state *b, morph_contact *c, const doub
         c->normal[k] = g[k] / slope;
     const double aim = radius + CONTACT_MARGIN * b->structure->spacing;
     c->level = morph_dot(c->normal, q) - (phi - aim) / fmax(slope, LEAST_SLOPE);
+    /* What was inside before this step comes out at the speed of a fall of half a spacing at most: the depth
+     * of a place found anew, over a short step, would be a blow. */
+    const double depth = c->level - morph_dot(c->normal, c->before);
+    const double most = b->pull > 0.0 ? sqrt(b->pull * b->structure->spacing) * b->step : INFINITY;
+    if (depth > most) c->level -= depth - most;
     c->radius = radius;
     return true;
 }

@@ -102,6 +102,7 @@ typedef struct morph_blanket_state {
     double rise_clock;    /* s the target has risen for; stands when it is held up */
     bool held_up;
     double retreat;          /* of a target that was held up, m/s */
+    double good_step;        /* that should be stable and resolves what forces do, s */
     double changed;          /* largest motion by a correction in this sweep, m */
     double most_move;        /* m in a step */
     double work;             /* done on the blanket since the frame's start by what it does not store, J */

@@ -218,6 +218,8 @@ static morph_status read_all(reader *r, morph_record *record) {
     if (status != MORPH_OK) return status;
     for (int i = 0; i < morph_record_count_total; i++)
         *morph_record_count(record, i) = r->known[i] < 0 ? 0 : r->known[i];
+    if (record->pose_width == 0) /* no path: what one would have */
+        record->pose_width = record->posts > 0 ? 6 * record->posts : 3 * record->joints;
     const char *missing = morph_record_incomplete(record);
     if (missing) return refuse(r, missing, "is missing");
     char fault[160];
