@@ -234,8 +234,8 @@ static void check_place(const morph_scene_reader *r, const morph_value *at) {
         morph_number_print(scene->base, base);
         morph_value_fault(at, "the target ends at height %s, below the base, allowed: above %s", top, base);
     }
-    /* The rising target starts below the blanket in its frame. */
-    if (scene->motion.mode == MORPH_MODE_RISE && !isnan(scene->base) &&
+    /* The rising target starts below the blanket in its frame; a height of 0 has its own fault. */
+    if (scene->motion.mode == MORPH_MODE_RISE && scene->motion.height > 0.0 && !isnan(scene->base) &&
         report->hi[2] - scene->motion.height > scene->base) {
         morph_number_print(scene->motion.height, top);
         morph_number_print(report->hi[2] - scene->base, base);

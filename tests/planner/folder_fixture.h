@@ -203,6 +203,7 @@ static morph_record fixture_record(int nx, int ny, int samples) {
     r.panel = fixture_array(0, 2 * sizeof(int));
     r.path_s = fixture_array(2, sizeof(double));
     r.path_s[1] = 1;
+    r.pose_width = 6 * r.posts;
     r.path_poses = fixture_array(2 * (size_t)r.posts, 6 * sizeof(double));
     for (size_t i = 0; i < 12 * (size_t)r.posts; i++)
         r.path_poses[i] = sin((double)i);
