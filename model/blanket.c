@@ -144,13 +144,14 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
     int now = first;
     b->most_move = MOST_MOVE * b->structure->spacing;
     bool good = advance(b, now, at->allowed);
-    while (!good && b->def.frame / now > least && now < MOST_STEPS / 2) {
+    while (!good && b->status == MORPH_OK && b->def.frame / now > least && now < MOST_STEPS / 2) {
         now *= 2;
         report->step_halvings++;
         rewind_frame(b, at);
         good = advance(b, now, at->allowed);
     }
     if (good && now > first) *steps = now;
+    if (b->status != MORPH_OK) return b->status;
     if (!good) {
         now = first;
         rewind_frame(b, at);

@@ -36,6 +36,9 @@ typedef struct morph_blanket_def {
     double base;     /* height of the base plane, NaN for none */
     const morph_attractor *attractors;
     int attractor_count;
+    /* Springs that hold posts square to their links (the paper's rectangular angles): energy stiffness/2
+     * cos^2 of every angle between a link and its post, N m. 0: posts lean freely between their limits. */
+    double square;
     double softening; /* of the attraction, m; 0: one spacing */
     const morph_hand *hands;
     int hand_count;

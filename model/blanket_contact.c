@@ -217,6 +217,7 @@ void morph_blanket_forget(morph_blanket_state *b) {
     memset(b->link_wake, 0, (size_t)b->links * sizeof *b->link_wake);
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
+    morph_blanket_self_forget(b->self);
 }
 
 double morph_blanket_moved(const morph_blanket_state *b, const double *x) {

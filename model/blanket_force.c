@@ -36,6 +36,15 @@ double morph_blanket_stable_step(const morph_structure *s, const morph_blanket_d
     double square = def->drive ? 0.0 : 2.0 * most * s->def.stiffness;
     for (int k = 0; k < def->attractor_count; k++)
         square += fabs(def->attractors[k].strength) / (soft * soft * soft);
+    /* An angle's gradient by a joint is at most 1/h + 1/L, squared at most (1/h + 1/L)^2; a joint is in the
+     * angles of its own links and post and of those of its post's other end, and in the far ends': 16 at
+     * most, and Gershgorin's other columns add as much again, three times. */
+    double arm = s->spacing;
+    for (int l = 0; l < s->links; l++)
+        arm = fmin(arm, s->length_limit[l][0]);
+    for (int p = 0; p < s->posts; p++)
+        arm = fmin(arm, s->post_length[p]);
+    square += 4.0 * 16.0 * def->square * 4.0 / (arm * arm);
     return 0.5 / sqrt(square / s->def.mass);
 }
 
@@ -53,6 +62,19 @@ static void add_springs(morph_blanket_state *b) {
             ai[k] += pull * d[k];
             aj[k] -= pull * d[k];
         }
+    }
+}
+
+/* Adds the angle springs' -k c grad c over m. Link-post tuples come first. */
+static void add_squares(morph_blanket_state *b) {
+    const double scale = b->def.square / b->structure->def.mass;
+    for (int t = 0; t < b->structure->link_posts; t++) {
+        const morph_angle *a = &b->angle[t];
+        double c, grad[4][3];
+        if (!morph_blanket_cosine_gradient(a, b->x, &c, grad)) continue;
+        for (int j = 0; j < a->joints; j++)
+            for (int k = 0; k < 3; k++)
+                b->a[3 * a->joint[j] + k] -= scale * c * grad[j][k];
     }
 }
 
@@ -77,6 +99,7 @@ void morph_blanket_accelerations(morph_blanket_state *b) {
             b->a[3 * hand->joint + k] += inverse * hand->force[k];
     }
     if (!b->def.drive) add_springs(b);
+    if (b->def.square > 0.0) add_squares(b);
     for (int j = 0; j < b->joints && b->def.fixed_count > 0; j++)
         for (int k = 0; k < 3; k++)
             b->a[3 * j + k] *= b->weight[j];
@@ -96,7 +119,11 @@ void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, doubl
 }
 
 double morph_blanket_energy(const morph_blanket_state *b) {
-    double kinetic, spring, height = 0.0, attraction = 0.0;
+    double kinetic, spring, height = 0.0, attraction = 0.0, angles = 0.0;
+    for (int t = 0; t < b->structure->link_posts && b->def.square > 0.0; t++) {
+        const double c = morph_blanket_cosine(&b->angle[t], b->x);
+        angles += 0.5 * b->def.square * c * c;
+    }
     morph_blanket_energies(b, &kinetic, &spring);
     const double soft = morph_blanket_softening(b->structure, &b->def);
     for (int j = 0; j < b->joints; j++) {
@@ -104,7 +131,7 @@ double morph_blanket_energy(const morph_blanket_state *b) {
         for (int k = 0; k < b->def.attractor_count; k++)
             attraction += morph_attraction(&b->def.attractors[k], soft, &b->x[3 * j], NULL, NULL);
     }
-    return kinetic + spring + attraction + b->structure->def.mass * b->def.gravity * height;
+    return kinetic + spring + attraction + angles + b->structure->def.mass * b->def.gravity * height;
 }
 
 /* exp(-2 beta) to second order, without ringing when beta is large. */
@@ -216,7 +243,10 @@ static bool drift(morph_blanket_state *b) {
     }
     if (!(fastest <= b->most_move) || !morph_blanket_finite(b)) return false;
     morph_blanket_project_posts_along(b);
-    morph_blanket_list_limits(b, b->x, morph_blanket_moved(b, b->x), false);
+    const double moved = morph_blanket_moved(b, b->x);
+    b->status = morph_blanket_find_self(b, moved);
+    if (b->status != MORPH_OK) return false;
+    morph_blanket_list_limits(b, b->x, moved, false);
     morph_blanket_find_contacts(b, b->x);
     morph_blanket_project_start(b, b->x, WARM);
     for (int sweep = 0; sweep < MORPH_BLANKET_SWEEPS; sweep++) {

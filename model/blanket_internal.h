@@ -77,6 +77,7 @@ typedef struct morph_violation {
 } morph_violation;
 
 typedef struct morph_blanket_fix morph_blanket_fix;
+typedef struct morph_blanket_self morph_blanket_self;
 
 typedef struct morph_blanket_state {
     const morph_structure *structure;
@@ -107,8 +108,10 @@ typedef struct morph_blanket_state {
     int near_links, near_angles;
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
-    double *spare_x;        /* 3*joints */
-    morph_memo *memo;       /* links, then skin triangles */
+    morph_blanket_self *self;
+    morph_status status; /* why a step failed, where not for its size */
+    double *spare_x;     /* 3*joints */
+    morph_memo *memo;    /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
@@ -159,6 +162,8 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, doubl
 bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
                              double grad[4][3]);
 double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
+/* The same with its gradient by the angle's joints, those held 0; false where it has none. */
+bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]);
 double morph_blanket_cosine(const morph_angle *a, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
@@ -173,6 +178,15 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x);
 morph_status morph_blanket_fix_create(const morph_structure *s, morph_blanket_fix **out);
 void morph_blanket_fix_destroy(morph_blanket_fix *f); /* NULL allowed */
 void morph_blanket_fix_apply(morph_blanket_state *b, double *x);
+
+/* blanket_self.c */
+morph_status morph_blanket_self_create(const morph_structure *s, morph_blanket_self **out);
+void morph_blanket_self_destroy(morph_blanket_self *self); /* NULL allowed */
+void morph_blanket_self_forget(morph_blanket_self *self);
+/* Lists the pairs of links and posts that can meet while joints move by up to `move` from `before`. */
+morph_status morph_blanket_find_self(morph_blanket_state *b, double move);
+void morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward);
+int morph_blanket_self_count(const morph_blanket_state *b); /* contacts listed in the last step */
 
 /* blanket_contact.c */
 morph_status morph_blanket_touches_create(morph_blanket_state *b);

@@ -225,6 +225,11 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double m
     }
 }
 
+bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]) {
+    double arm;
+    return cosine(a, x, c, grad, &arm) > 0.0;
+}
+
 static double clip(double value, double most) {
     return fmax(-most, fmin(most, value));
 }
@@ -345,6 +350,7 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, doubl
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
         project_panel(b, backward ? panels - 1 - p : p, x);
+    morph_blanket_project_self(b, x, backward);
     for (int c = 0; c < b->contacts; c++)
         morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
     project_posts(b, x);

@@ -25,8 +25,8 @@ static bool arrays_ok(const morph_structure *s, const morph_blanket_def *d) {
 }
 
 static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
-    const double least_zero[] = {d->gravity, d->drag, d->friction,  d->time,
-                                 d->step,    d->rise, d->rise_time, d->softening};
+    const double least_zero[] = {d->gravity, d->drag,      d->friction,  d->time,  d->step,
+                                 d->rise,    d->rise_time, d->softening, d->square};
     for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
         if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
     if (!finite3(d->velocity) || (d->rise > 0.0 && !(d->rise_time > 0.0)) || !arrays_ok(s, d)) return false;
@@ -44,6 +44,7 @@ static morph_status allocate(morph_blanket_state *b) {
     for (int k = 0; k < b->def.fixed_count; k++)
         b->weight[b->def.fixed[k]] = 0.0;
     morph_status status = morph_blanket_fix_create(b->structure, &b->fix);
+    if (status == MORPH_OK) status = morph_blanket_self_create(b->structure, &b->self);
     if (status == MORPH_OK) status = morph_blanket_limits_create(b);
     return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
 }
@@ -96,6 +97,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->push);
     free(b->angle);
     morph_blanket_fix_destroy(b->fix);
+    morph_blanket_self_destroy(b->self);
     free(b->memo);
     free(b->touch);
     free(b->contact);

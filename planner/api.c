@@ -261,6 +261,8 @@ int morph_picture_folder(const char *folder, const char *file, const morph_job *
         return MORPH_EXIT_INPUT;
     }
     morph_status status = morph_folder_read(folder, &record, message, sizeof message);
+    if (status == MORPH_OK && job && job->motion)
+        status = morph_picture_select(&record, job->motion, message, sizeof message);
     if (status == MORPH_OK) status = morph_picture_write(&record, NULL, file, message, sizeof message);
     morph_record_free(&record);
     if (status == MORPH_OK) return MORPH_EXIT_DONE;

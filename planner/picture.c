@@ -42,9 +42,27 @@ static bool drawable(const morph_record *r) {
            all_finite(r->link_radius, (size_t)r->links) && isfinite(r->spacing) && r->spacing > 0;
 }
 
-/* Start, a third, two thirds, end. */
-static int moment(const morph_motion *m, int k) {
-    return (int)((long long)(m->frames - 1) * k / 3);
+/* Joints' mean squared distance of two frames. */
+static double apart(const morph_record *r, const morph_motion *m, int a, int b) {
+    const size_t n = 3 * (size_t)r->joints;
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        const double d = m->joints[(size_t)a * n + i] - m->joints[(size_t)b * n + i];
+        sum += d * d;
+    }
+    return sqrt(sum);
+}
+
+/* Start, a third, two thirds, end: of the time for a schedule; a blanket falls fast and settles slowly, so
+ * there of the way to its end. */
+static int moment(const morph_record *r, const morph_motion *m, int k) {
+    const int last = m->frames - 1;
+    if (r->samples > 0 || k == 0 || k == 3) return (int)((long long)last * k / 3);
+    const double all = apart(r, m, 0, last);
+    int f = 0;
+    while (f < last && apart(r, m, f, last) > all * (3 - k) / 3.0)
+        f++;
+    return f;
 }
 
 static const double *joints_at(const morph_record *r, const morph_motion *m, int frame) {
@@ -80,7 +98,7 @@ static void fit_moments(const morph_record *r, const morph_motion *m, const morp
                         morph_view *view) {
     morph_bounds bounds = morph_bounds_empty();
     for (int k = 0; k < 4; k++) {
-        int frame = moment(m, k);
+        int frame = moment(r, m, k);
         morph_bounds_add(&bounds, view, joints_at(r, m, frame), r->joints, NULL);
         morph_bounds_add(&bounds, view, r->target_v, r->target_vertices, offset_at(m, frame));
         add_ground(r, joints_at(r, m, frame), view, &bounds);
@@ -88,13 +106,20 @@ static void fit_moments(const morph_record *r, const morph_motion *m, const morp
     morph_view_fit(view, &bounds, box);
 }
 
-static void caption(cairo_t *c, const morph_motion *m, int k, const morph_box *box) {
+/* Panels a to f, as figures are cited. */
+static void letter(cairo_t *c, int panel, double x, double y) {
+    const char text[3] = {(char)('a' + panel), ')', 0};
+    morph_put_text(c, text, x, y, 17, 0, true, morph_colour_faint);
+}
+
+static void caption(cairo_t *c, const morph_record *r, const morph_motion *m, int k, const morph_box *box) {
     static const char *const names[] = {"start", "one third", "two thirds", "end"};
     char text[64];
-    snprintf(text, sizeof text, "t = %.2f s", m->time[moment(m, k)]);
-    morph_put_text(c, text, box->x + 14, box->y + 26, 17, 0, true, morph_colour_text);
+    snprintf(text, sizeof text, "t = %.2f s", m->time[moment(r, m, k)]);
+    letter(c, k, box->x + 14, box->y + 26);
+    morph_put_text(c, text, box->x + 40, box->y + 26, 17, 0, true, morph_colour_text);
     double after = morph_text_width(c, text, 17, true);
-    morph_put_text(c, names[k], box->x + 26 + after, box->y + 26, 15, 0, false, morph_colour_faint);
+    morph_put_text(c, names[k], box->x + 52 + after, box->y + 26, 15, 0, false, morph_colour_faint);
 }
 
 static void frame_box(cairo_t *c, const morph_box *box) {
@@ -110,14 +135,14 @@ static morph_box inside(const morph_box *box) {
 
 static morph_status draw_moment(cairo_t *c, const morph_record *r, const morph_motion *m, int k,
                                 const morph_box *box, const morph_view *view, const morph_relief *relief) {
-    int frame = moment(m, k);
+    int frame = moment(r, m, k);
     frame_box(c, box);
     cairo_save(c);
     cairo_rectangle(c, box->x, box->y, box->width, box->height);
     cairo_clip(c);
     morph_status status = morph_draw_pose(c, r, joints_at(r, m, frame), offset_at(m, frame), view, relief);
     cairo_restore(c);
-    caption(c, m, k, box);
+    caption(c, r, m, k, box);
     return status;
 }
 
@@ -201,6 +226,8 @@ static morph_status draw_page(cairo_t *c, const morph_record *r, const char *tit
     const morph_box left = {28, 1018, 664, 372}, right = {700, 1018, 672, 372};
     if (status == MORPH_OK) status = morph_draw_length(c, r, &m, &left);
     if (status == MORPH_OK) status = morph_draw_lengths(c, r, &m, &right);
+    letter(c, 4, left.x + 22, left.y + 18);
+    letter(c, 5, right.x + 22, right.y + 18);
     morph_relief_free(&relief);
     return status;
 }

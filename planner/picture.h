@@ -4,6 +4,14 @@
 
 #include "planner/record.h"
 
+enum { MORPH_PICTURE_MOTIONS = 4 };
+extern const char *const morph_picture_motions[MORPH_PICTURE_MOTIONS]; /* schedule, blanket, replay, core */
+
+/* Makes `motion` the one that a picture of the record shows, by dropping the others from it: the schedule,
+ * the pure blanket, what the lengths alone lead to, the same with the target as a solid core. MORPH_ERR_INPUT
+ * with a message for another name or where the record has no such motion, MORPH_ERR_NOMEM. */
+morph_status morph_picture_select(morph_record *record, const char *motion, char *message, size_t size);
+
 /* Draws: structure, skin and target at four moments of the schedule; the length of one link near the middle
  * over time (with its limits); all lengths over time. The file's ending decides (.svg or .png). Written
  * beside and renamed. MORPH_ERR_INPUT for another ending. */

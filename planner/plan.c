@@ -289,14 +289,17 @@ static morph_status stage_replay(planner *p) {
     }
     const double since = morph_seconds();
     const bool on_target = p->work.structure->def.support == MORPH_SUPPORT_TARGET;
-    morph_replay_input in = {p->work.structure, p->scene, p->work.cavity,     NULL,     NULL,
-                             r->samples,        0.0,      r->schedule_joints, r->length};
+    morph_replay_input in = {.structure = p->work.structure,
+                             .scene = p->scene,
+                             .cavity = p->work.cavity,
+                             .samples = r->samples,
+                             .joints = r->schedule_joints,
+                             .length = r->length};
     in.step = r->samples > 1 ? r->time[1] - r->time[0] : p->scene->sample;
     morph_status status = MORPH_OK;
     for (int core = on_target ? 1 : 0; core < 2 && status == MORPH_OK; core++) {
         morph_trajectory t;
         in.core = core ? p->work.sdf : NULL;
-        in.exact = core ? p->work.exact : NULL;
         status = morph_replay_run(&in, control_of(p), &t, core && !on_target ? &s->replay_core : &s->replay);
         if (status == MORPH_OK && core && !on_target)
             morph_record_replay(&t, &r->core_frames, &r->core_time, &r->core_joints);

@@ -24,8 +24,7 @@ typedef struct morph_replay_input {
     const morph_structure *structure;
     const morph_scene *scene; /* gravity, drag, friction, base, support */
     const morph_cavity *cavity;
-    const morph_sdf *core;       /* the target as a solid, or NULL: the display is empty */
-    const morph_distance *exact; /* of the core, or NULL */
+    const morph_sdf *core; /* the target as a solid, or NULL: the display is empty */
     int samples;
     double step;
     const double *joints, *length; /* samples x 3*joints, samples x links */

@@ -17,6 +17,9 @@ static const char usage_text[] =
     "  check DIR [--schedule FILE]        verify a plan folder and its files, or a schedule file against its "
     "plan\n"
     "  picture DIR -o FILE.svg|png        still pictures: four moments, lengths over time\n"
+    "          [--of MOTION]              of the schedule (default), the blanket, the replay of its "
+    "lengths,\n"
+    "                                     or core: the replay with the target as a solid core\n"
     "  info SCENE                         structure with link numbers, mobility, target; solves nothing\n"
     "\n"
     "options of plan:\n"
@@ -144,12 +147,13 @@ enum {
     O_VERBOSE,
     O_THREADS,
     O_SCHEDULE,
+    O_OF,
     O_HELP,
     O_VERSION
 };
 
 typedef struct arguments {
-    const char *output, *method, *schedule, *subject;
+    const char *output, *method, *schedule, *motion, *subject;
     bool overwrite, json, quiet, verbose;
 } arguments;
 
@@ -188,6 +192,12 @@ static int take_option(int option, const char *value, arguments *a) {
     case O_VERBOSE:
         a->verbose = true;
         return 0;
+    case O_OF:
+        a->motion = value;
+        if (strcmp(value, "schedule") == 0 || strcmp(value, "blanket") == 0 || strcmp(value, "replay") == 0 ||
+            strcmp(value, "core") == 0)
+            return 0;
+        return usage_fault("--of", value, "schedule, blanket, replay, core");
     case O_SCHEDULE:
         a->schedule = value;
         return 0;
@@ -214,6 +224,7 @@ static const struct option options[] = {{"method", required_argument, NULL, O_ME
                                         {"verbose", no_argument, NULL, O_VERBOSE},
                                         {"threads", required_argument, NULL, O_THREADS},
                                         {"schedule", required_argument, NULL, O_SCHEDULE},
+                                        {"of", required_argument, NULL, O_OF},
                                         {"help", no_argument, NULL, O_HELP},
                                         {"version", no_argument, NULL, O_VERSION},
                                         {NULL, 0, NULL, 0}};
@@ -224,6 +235,8 @@ static int takers(int option) {
         return PLAN | PICTURE;
     case O_SCHEDULE:
         return CHECK;
+    case O_OF:
+        return PICTURE;
     case O_QUIET:
     case O_VERBOSE:
     case O_HELP:
@@ -312,7 +325,8 @@ static int run_check(const arguments *a) {
 
 static int run_picture(const arguments *a) {
     screen s;
-    const morph_job job = make_job(a, &s);
+    morph_job job = make_job(a, &s);
+    job.motion = a->motion;
     if (!a->output) return usage_fault("picture", "no -o", "-o FILE.svg or -o FILE.png");
     return morph_picture_folder(a->subject, a->output, &job);
 }

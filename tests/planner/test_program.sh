@@ -143,6 +143,8 @@ says 'o is no option of info'
 refused info "$scene" --json
 refused picture "$plan" -o "$work/none.svg" --schedule "$work/bad.csv"
 absent "$work" none.svg
+refused plan "$scene" -o "$work/none.plan" --of blanket
+says 'of is no option of plan'
 
 # Limits of a scene are told where they stand.
 printf 'morphplan: 1\nstructure:\n  nodes: [4, 4]\n  spacing: 0.1\n  angle: {link_post: [0, 180]}\ntarget: {shape: sphere, radius: 0.1}\n' >"$work/angle.yaml"
