@@ -5,8 +5,9 @@
 #include <string.h>
 
 /* At rest: for REST_WINDOW sqrt(spacing / gravity), the time a joint takes to fall half a spacing four times
- * over, no joint is faster than REST_SPEED sqrt(gravity spacing): it would then creep less than 1e-2 spacings
- * in that window, far below the gaps (0.1 spacings and more) that the end pose is judged by. */
+ * over, no joint leaves a ball of REST_SPEED sqrt(gravity spacing) times that, 2e-2 spacings: far below the
+ * gaps (0.1 spacings and more) that the end pose is judged by. A contact's trembling in place is no motion.
+ */
 #define REST_SPEED 5e-3
 #define REST_WINDOW 4.0
 /* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
@@ -19,6 +20,10 @@
  * What moves further is not safely followed along its way. */
 #define PLANNED_MOVE 0.1
 #define MOST_MOVE 0.25
+/* What would move further than FAST spacings in the step that forces ask for is planned for FAST_MOVE: half a
+ * link's usual radius, with which even an edge without thickness does not cut the skin. */
+#define FAST 0.15
+#define FAST_MOVE 0.02
 /* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
  * angle): half a degree, what the falling blanket's own frames keep. */
 #define ANGLE_GIVES 0.01
@@ -52,6 +57,8 @@ static morph_violation record(morph_blanket_state *b, double time, morph_traject
     double *x = &t->x[(size_t)t->frames * 3 * (size_t)b->joints];
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));
     const morph_violation worst = morph_blanket_polish(b, x);
+    /* What was in the target by exact distances would be so again: the motion goes on from outside. */
+    if (b->entered) memcpy(b->x, x, 3 * (size_t)b->joints * sizeof(double));
     t->lift[t->frames] = b->lift;
     t->time[t->frames++] = time;
     return worst;
@@ -98,6 +105,7 @@ static frame_start keep_frame(morph_blanket_state *b) {
     const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
     memcpy(b->keep_x, b->x, bytes);
     memcpy(b->keep_v, b->v, bytes);
+    if (b->soft) morph_blanket_soft_keep_frame(b);
     return (frame_start){b->time, b->lift, b->rise_clock, allowed_energy(b)};
 }
 
@@ -108,6 +116,7 @@ static void rewind_frame(morph_blanket_state *b, const frame_start *at) {
     b->time = at->time;
     b->lift = b->lift_to = at->lift;
     b->rise_clock = at->rise_clock;
+    if (b->soft) morph_blanket_soft_rewind_frame(b);
     morph_blanket_accelerations(b);
     morph_blanket_forget(b);
 }
@@ -131,7 +140,9 @@ static int steps_for_speed(const morph_blanket_state *b, int steps) {
     double fastest = 0.0;
     for (int k = 0; k < 3 * b->joints; k++)
         fastest = fmax(fastest, fabs(b->v[k]));
-    const double most = b->def.frame * fastest / (PLANNED_MOVE * b->structure->spacing);
+    const double spacing = b->structure->spacing;
+    const bool fast = b->sdf && fastest * good_step(b->structure, &b->def) > FAST * spacing;
+    const double most = b->def.frame * fastest / ((fast ? FAST_MOVE : PLANNED_MOVE) * spacing);
     return (int)fmin(fmax(steps, ceil(most)), MOST_STEPS);
 }
 
@@ -158,18 +169,24 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
         b->most_move = INFINITY;
         if (!advance(b, now, INFINITY)) return MORPH_ERR_NONFINITE;
         memset(b->v, 0, 3 * (size_t)b->joints * sizeof(double));
+        if (b->soft) morph_blanket_soft_stop(b);
     }
     report->steps += now;
     report->step = b->step;
     return MORPH_OK;
 }
 
-/* Mean over the frame of the fastest joint: a contact's trembling within it is no motion. */
-static double frame_speed(const morph_blanket_state *b) {
+static double farthest(const morph_blanket_state *b, const double *from) {
     double most = 0.0;
     for (int j = 0; j < b->joints; j++)
-        most = fmax(most, morph_dist(&b->x[3 * j], &b->keep_x[3 * j]));
-    return most / b->def.frame;
+        most = fmax(most, morph_dist(&b->x[3 * j], &from[3 * j]));
+    return most;
+}
+
+/* Mean over the frame of what moved fastest. */
+static double frame_speed(const morph_blanket_state *b) {
+    const double soft = b->soft ? morph_blanket_soft_frame_move(b) : 0.0;
+    return fmax(soft, farthest(b, b->keep_x)) / b->def.frame;
 }
 
 /* The target is in the blanket because something holds that against it: the limit that is pushed hardest. */
@@ -270,6 +287,7 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     const double window = scale > 0.0 ? REST_WINDOW * sqrt(s->spacing / scale) : 0.0;
     int steps = steps_per_frame(s, &b->def);
     double calm = 0.0;
+    memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
     if (b->def.drive) morph_blanket_schedule(b);
     morph_blanket_polish(b, b->x);
     morph_blanket_accelerations(b);
@@ -277,10 +295,17 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     note_worst(report, &v);
     while (t->frames < frames) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
-        const morph_status status = record_next(b, &steps, t, report);
+        morph_status status = record_next(b, &steps, t, report);
+        if (status == MORPH_OK && b->soft) status = morph_blanket_soft_status(b);
         if (status != MORPH_OK) return status;
         morph_progress(control, b->def.drive ? "replay" : "nominal", (double)t->frames / frames);
-        calm = report->rest_speed <= speed && !driven(b) ? calm + b->def.frame : 0.0;
+        calm += b->def.frame;
+        /* A deformable target must be slow too; the blanket may tremble in place. */
+        const bool soft_moves = b->soft && morph_blanket_soft_frame_move(b) > speed * b->def.frame;
+        if (driven(b) || soft_moves || farthest(b, b->rest_x) > speed * window) {
+            memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
+            calm = 0.0;
+        }
         report->at_rest = calm > 0.0 && calm >= window;
         if (report->at_rest) break;
     }
@@ -297,7 +322,7 @@ morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf
     morph_blanket_state *b;
     morph_status status = morph_blanket_state_create(structure, sdf, def, x0, &b);
     if (status != MORPH_OK) return status;
-    b->exact = exact;
+    if (!def->body) b->exact = exact;
     /* A frame more where the time is no whole number of them: the last then lies beyond it. */
     const double frames = ceil(def->time / def->frame * (1.0 - 1e-12)) + 1.0;
     if (!(frames <= MOST_FRAMES) || steps_per_frame(structure, def) == 0)

@@ -7,6 +7,7 @@
 #define MORPH_BLANKET_H
 
 #include "model/attraction.h"
+#include "model/body.h"
 #include "model/distance.h"
 #include "model/sdf.h"
 #include "model/structure.h"
@@ -50,6 +51,10 @@ typedef struct morph_blanket_def {
     double rise, rise_time;
     double velocity[3];       /* of all free joints at the start, m/s */
     const morph_drive *drive; /* links hold these lengths instead of being springs */
+    /* A deformable target in its place, or NULL; the run needs sdf and exact to be NULL then. It is moved
+     * with the blanket and left as the last frame has it. Contact is both ways; recorded frames are polished
+     * against its surface of that moment. */
+    morph_body *body;
 } morph_blanket_def;
 
 /* Owned arrays; zeroed is empty. */
@@ -90,7 +95,8 @@ typedef struct morph_blanket_report {
  * does not change the motion. report may be NULL. On MORPH_ERR_STOPPED the frames so far are in *out; on any
  * other failure *out is empty. MORPH_ERR_NONFINITE if x0 is not finite or the motion cannot be kept from
  * growing without cause; MORPH_ERR_INPUT for a negative or non-finite def, a joint that does not exist, or
- * more than 1e6 frames or steps a frame. */
+ * more than 1e6 frames or steps a frame (of the
+ * blanket or of the body), a body beside a rigid target. */
 morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf *sdf,
                                const morph_distance *exact, const morph_blanket_def *def, const double *x0,
                                const morph_control *control, morph_trajectory *out,

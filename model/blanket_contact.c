@@ -22,6 +22,10 @@
 #define SWEPT_CLOSE 0.05
 #define SWEPT_STRIDES 64
 
+/* A seeking place moves to where the exact distance is deepest if that is deeper by this, spacings: places at
+ * rest stay where they are. */
+#define SEEK_GAIN 5e-3
+
 static morph_touch *add_touch(morph_blanket_state *b, const int *joint, int corners, const double *weight,
                               double radius) {
     morph_touch *t = &b->touch[b->touches++];
@@ -58,12 +62,14 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     for (int l = 0; l < s->links; l++) {
         for (int k = 0; k < 3; k++)
             add_touch(b, s->link[l], 2, along[k], s->link_radius[l]);
-        if (s->link_kind[l] != MORPH_LINK_BOTTOM)
-            add_touch(b, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
+        if (s->link_kind[l] == MORPH_LINK_BOTTOM) continue;
+        b->memo[l].touch = b->touches;
+        add_touch(b, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
     }
     for (int t = 0; t < s->skin_triangles; t++) {
         for (int k = 0; k < 4; k++)
             add_touch(b, s->skin[t], 3, within[k], s->def.radius);
+        b->memo[s->links + t].touch = b->touches;
         add_touch(b, s->skin[t], 3, within[3], s->def.radius)->stride = LONGEST_STRIDE;
     }
     return MORPH_OK;
@@ -218,6 +224,7 @@ void morph_blanket_forget(morph_blanket_state *b) {
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
     morph_blanket_self_forget(b->self);
+    if (b->soft) morph_blanket_soft_forget(b);
 }
 
 double morph_blanket_moved(const morph_blanket_state *b, const double *x) {
@@ -236,9 +243,11 @@ void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
     for (int t = 0; t < b->touches; t++)
         find_target(b, &b->touch[t], x, move);
     if (!isnan(b->def.base)) find_base(b, x, move);
+    if (b->soft) morph_blanket_soft_find(b, x, NEAR * b->structure->spacing + move);
 }
 
 void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
+    if (b->soft) morph_blanket_soft_renew(b);
     for (int k = 0; k < b->contacts; k++) {
         morph_contact *c = &b->contact[k];
         if (c->radius >= 0.0 && c->push > 0.0) set_plane(b, c, x, c->radius);
@@ -296,6 +305,7 @@ void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm
         set_drag(c, want, b->def.friction, change);
         move_corners(c, x, change);
     }
+    if (b->soft && warm > 0.0) morph_blanket_soft_start(b, x, warm, most);
 }
 
 void morph_blanket_keep_contacts(morph_blanket_state *b) {
@@ -305,6 +315,7 @@ void morph_blanket_keep_contacts(morph_blanket_state *b) {
         b->hold[c->source].push = c->push;
         memcpy(b->hold[c->source].drag, c->drag, sizeof c->drag);
     }
+    if (b->soft) morph_blanket_soft_keep(b);
 }
 
 static double base_depth(const morph_blanket_state *b, const double *x) {
@@ -364,18 +375,36 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
         const element e = element_of(s, n);
         if (!e.tested) continue;
         morph_memo *memo = &b->memo[n];
-        double v[3][3], weight[3], moved = 0.0;
+        double v[3][3], moved = 0.0;
         morph_closest at;
         place_element(b, x, e.joint, e.corners, v);
         for (int k = 0; k < e.corners && memo->known; k++)
             moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
         if (memo->known && memo->gap - moved >= 0.0) continue;
-        memo->gap = exact_gap(b, v, e.corners, e.radius, weight, &at);
-        memo->known = true;
+        memo->gap = exact_gap(b, v, e.corners, e.radius, memo->weight, &at);
+        memo->known = memo->fresh = true;
         memcpy(memo->corner, v, sizeof v);
         depth = fmax(depth, -memo->gap);
     }
     return depth;
+}
+
+void morph_blanket_seek_deepest(morph_blanket_state *b) {
+    const morph_structure *s = b->structure;
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        morph_memo *memo = &b->memo[n];
+        if (!memo->fresh) continue;
+        memo->fresh = false;
+        if (memo->gap > NEAR * s->spacing) continue;
+        morph_touch *t = &b->touch[memo->touch];
+        double q[3];
+        place_of(b->x, t->joint, t->corners, t->weight, q);
+        const double here = distance_at(b, q, NULL) - t->radius;
+        if (memo->gap >= 0.0 && memo->gap > here - SEEK_GAIN * s->spacing) continue;
+        memcpy(t->weight, memo->weight, sizeof t->weight);
+        t->stride = SHORTEST_STRIDE;
+        t->wake = 0.0;
+    }
 }
 
 /* One contact at the deepest place of an element. */

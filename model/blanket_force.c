@@ -110,6 +110,7 @@ void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, doubl
     *kinetic = *spring = 0.0;
     for (int k = 0; k < 3 * b->joints; k++)
         *kinetic += 0.5 * s->def.mass * b->v[k] * b->v[k];
+    if (b->soft) morph_blanket_soft_energies(b, kinetic, spring, NULL);
     if (b->def.drive) return;
     for (int l = 0; l < b->links; l++) {
         const double stretch =
@@ -131,7 +132,9 @@ double morph_blanket_energy(const morph_blanket_state *b) {
         for (int k = 0; k < b->def.attractor_count; k++)
             attraction += morph_attraction(&b->def.attractors[k], soft, &b->x[3 * j], NULL, NULL);
     }
-    return kinetic + spring + attraction + angles + b->structure->def.mass * b->def.gravity * height;
+    double body = 0.0;
+    if (b->soft) morph_blanket_soft_energies(b, NULL, NULL, &body);
+    return kinetic + spring + attraction + angles + body + b->structure->def.mass * b->def.gravity * height;
 }
 
 /* exp(-2 beta) to second order, without ringing when beta is large. */
@@ -242,6 +245,7 @@ static bool drift(morph_blanket_state *b) {
         fastest = fmax(fastest, fabs(b->step * b->v[k]));
     }
     if (!(fastest <= b->most_move) || !morph_blanket_finite(b)) return false;
+    if (b->soft && !morph_blanket_soft_step(b)) return false;
     morph_blanket_project_posts_along(b);
     const double moved = morph_blanket_moved(b, b->x);
     b->status = morph_blanket_find_self(b, moved);
@@ -254,6 +258,7 @@ static bool drift(morph_blanket_state *b) {
         morph_blanket_sweep(b, b->x, (sweep & 1) != 0, b->def.friction);
     }
     morph_blanket_keep_contacts(b);
+    if (b->soft) morph_blanket_soft_moved(b);
     b->path += take_velocity(b) + fabs(b->lift_to - b->lift);
     b->work += step_work(b);
     return morph_blanket_finite(b);

@@ -40,7 +40,8 @@ typedef struct morph_contact {
 /* Angle between u and v as floor <= cos <= ceiling; joint[k] enters u with su[k] and v with sv[k]. */
 typedef struct morph_angle {
     int joint[4], joints;
-    int far[2]; /* where the arms end */
+    int u[2], v[2]; /* an arm leads from its first joint to its second */
+    int far[2];     /* where the arms end */
     double su[4], sv[4];
     double weight[4];       /* of its joints */
     double floor, ceiling;  /* aimed at, a little inside */
@@ -63,7 +64,9 @@ typedef struct morph_angle {
 /* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
 typedef struct morph_memo {
     double corner[3][3], gap;
-    bool known;
+    double weight[3];  /* of the deepest place */
+    int touch;         /* the place that seeks on it */
+    bool known, fresh; /* fresh: taken since the last morph_blanket_seek_deepest */
 } morph_memo;
 
 /* How far the state is from its limits; violations are >= 0. */
@@ -78,6 +81,7 @@ typedef struct morph_violation {
 
 typedef struct morph_blanket_fix morph_blanket_fix;
 typedef struct morph_blanket_self morph_blanket_self;
+typedef struct morph_blanket_soft morph_blanket_soft;
 
 typedef struct morph_blanket_state {
     const morph_structure *structure;
@@ -100,6 +104,7 @@ typedef struct morph_blanket_state {
     double *a;               /* acceleration at x by springs and gravity */
     double *before;          /* x at the step's start */
     double *keep_x, *keep_v; /* for a second try with a smaller step */
+    double *rest_x;          /* where the ball of rest has its middle */
     double (*bound)[2];      /* links: the limits that hold: the structure's, or the prescribed lengths */
     double (*limit)[2];      /* links: what the projection aims at, a little inside */
     double (*push)[2];       /* links: accumulated corrections of this step at the two limits */
@@ -109,9 +114,11 @@ typedef struct morph_blanket_state {
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
     morph_blanket_self *self;
-    morph_status status; /* why a step failed, where not for its size */
-    double *spare_x;     /* 3*joints */
-    morph_memo *memo;    /* links, then skin triangles */
+    morph_blanket_soft *soft; /* the deformable target; NULL: none */
+    morph_status status;      /* why a step failed, where not for its size */
+    double *spare_x;          /* 3*joints */
+    bool entered;             /* the last frame had to be brought out of the target by exact distances */
+    morph_memo *memo;         /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
@@ -203,11 +210,47 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x);
 /* The same by exact distances over whole links and triangles. An element that has moved less than its last
  * distance left over is not measured again. */
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
+/* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
+ * between the fixed places is then felt by the steps that follow. */
+void morph_blanket_seek_deepest(morph_blanket_state *b);
 /* Lists the contacts near x by exact distances. */
 void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
 /* Part of project_start; most: largest push to start with, m. */
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */
 void morph_blanket_project_contact(morph_contact *c, double *x, double friction);
+
+/* blanket_body.c: the deformable target. All but create and destroy need b->soft. */
+morph_status morph_blanket_soft_create(morph_blanket_state *b); /* does nothing without def.body */
+void morph_blanket_soft_destroy(morph_blanket_soft *soft);      /* NULL allowed; the body stays */
+/* Moves the body on by a step, its foot with the target's lift. False where it cannot be kept finite. */
+bool morph_blanket_soft_step(morph_blanket_state *b);
+/* After the sweeps: what contact moved becomes the body's velocity. */
+void morph_blanket_soft_moved(morph_blanket_state *b);
+/* Parts of the functions for rigid contact of the same names. near: how far contacts are listed, m. */
+void morph_blanket_soft_find(morph_blanket_state *b, const double *x, double near);
+void morph_blanket_soft_start(morph_blanket_state *b, double *x, double warm, double most);
+void morph_blanket_soft_renew(morph_blanket_state *b);
+void morph_blanket_soft_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
+void morph_blanket_soft_keep(morph_blanket_state *b);
+void morph_blanket_soft_forget(morph_blanket_state *b);
+/* From hold to release a frame is polished: the body stands as a rigid solid, b->exact is the exact distance
+ * to its surface, and the contacts of the motion rest. */
+void morph_blanket_soft_hold(morph_blanket_state *b);
+void morph_blanket_soft_release(morph_blanket_state *b);
+/* The body as a frame starts, to come back to. */
+void morph_blanket_soft_keep_frame(morph_blanket_state *b);
+void morph_blanket_soft_rewind_frame(morph_blanket_state *b);
+void morph_blanket_soft_stop(morph_blanket_state *b); /* takes its speed away */
+/* Longest motion of a vertex since the frame's start, m. */
+double morph_blanket_soft_frame_move(const morph_blanket_state *b);
+/* Added to what is there, J; any may be NULL. */
+void morph_blanket_soft_energies(const morph_blanket_state *b, double *kinetic, double *spring,
+                                 double *height);
+int morph_blanket_soft_contacts(const morph_blanket_state *b); /* listed in the last step */
+/* Force of the body on the blanket in the last step, N. */
+void morph_blanket_soft_force(const morph_blanket_state *b, double force[3]);
+/* What failed in a step or a frame that cannot say so itself; MORPH_OK otherwise. */
+morph_status morph_blanket_soft_status(const morph_blanket_state *b);
 
 #endif

@@ -10,8 +10,11 @@
 /* From then on a round must take this part off what is left, or the polishing ends. */
 #define LEAST_ROUNDS 4
 #define BETTER 0.9
+/* Deeper than this, in spacings, a part of the target has come between the places that the steps look at;
+ * shallower, polishing the frame alone is enough and the motion is left in peace. */
+#define ENTERED 0.06
 /* Rounds with contact by exact distances, which cost a tree search per element. */
-#define EXACT_ROUNDS 6
+#define EXACT_ROUNDS 8
 /* Of lengths, posts, panels and angles at x. */
 static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
@@ -57,6 +60,7 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
     for (int round = 0;; round++) {
         morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
         if (exact) v.clearance = morph_blanket_depth_exact(b, x);
+        if (exact && round == 0) b->entered = v.clearance > ENTERED * b->structure->spacing;
         if (held(b, &v) || round == rounds) return v;
         /* What does not get better cannot be met: contradicting lengths, a target in the way of a limit. */
         const double spacing = b->structure->spacing;
@@ -82,10 +86,13 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     memcpy(b->spare_angle, b->angle, angle);
     memcpy(b->spare_touch, b->touch, touch);
     memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
+    if (b->soft) morph_blanket_soft_hold(b);
     morph_violation v = polish(b, x, false, ROUNDS);
-    if (b->exact && b->sdf) v = polish(b, x, true, EXACT_ROUNDS);
+    if (b->exact && (b->sdf || b->soft)) v = polish(b, x, true, EXACT_ROUNDS);
+    if (b->soft) morph_blanket_soft_release(b);
     memcpy(b->push, b->spare_push, push);
     memcpy(b->angle, b->spare_angle, angle);
     memcpy(b->touch, b->spare_touch, touch);
+    if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }

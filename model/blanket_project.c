@@ -16,6 +16,10 @@
 /* Joints of a tuple with their parts in u and v. */
 static void set_angle(morph_angle *a, const int uj[2], const int vj[2], const double limit[2]) {
     a->joints = 0;
+    for (int k = 0; k < 2; k++) {
+        a->u[k] = uj[k];
+        a->v[k] = vj[k];
+    }
     for (int k = 0; k < 4; k++) {
         const int joint = k < 2 ? uj[k] : vj[k - 2];
         int at = 0;
@@ -148,11 +152,8 @@ static void start_length(morph_blanket_state *b, int l, double *x, double warm, 
 }
 
 static void arms(const morph_angle *a, const double *x, double u[3], double v[3]) {
-    for (int j = 0; j < a->joints; j++)
-        for (int k = 0; k < 3; k++) {
-            u[k] += a->su[j] * x[3 * a->joint[j] + k];
-            v[k] += a->sv[j] * x[3 * a->joint[j] + k];
-        }
+    morph_sub(&x[3 * a->u[1]], &x[3 * a->u[0]], u);
+    morph_sub(&x[3 * a->v[1]], &x[3 * a->v[0]], v);
 }
 
 /* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
@@ -160,7 +161,7 @@ static void arms(const morph_angle *a, const double *x, double u[3], double v[3]
  * parallel, which the limits keep far from, or all joints are held. arm: the shorter arm's length. grad may
  * be NULL, then so may arm, and 0 is returned. */
 static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
-    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+    double u[3], v[3];
     arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
@@ -195,7 +196,7 @@ static bool link_near(morph_blanket_state *b, int l, const double *x, double nea
  * most their sum: it keeps a distance g where m <= g a / (4 + 2 g). */
 static bool angle_near(const morph_blanket_state *b, morph_angle *a, const double *x, double near,
                        bool note) {
-    double u[3] = {0, 0, 0}, v[3] = {0, 0, 0};
+    double u[3], v[3];
     arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     if (!(scale > 0.0)) return true;
@@ -205,12 +206,23 @@ static bool angle_near(const morph_blanket_state *b, morph_angle *a, const doubl
     return !(spare > 0.0);
 }
 
+/* What a step moved the given joints by: sweeps take back at most that, and add what they may. */
+static double own_move(const morph_blanket_state *b, const double *x, const int *joint, int joints) {
+    double most = 0.0, d[3];
+    for (int k = 0; k < joints; k++) {
+        morph_sub(&x[3 * joint[k]], &b->before[3 * joint[k]], d);
+        most = fmax(most, morph_dot(d, d));
+    }
+    return sqrt(most);
+}
+
 void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all) {
-    const double near = SWEEPS_ADD * b->structure->spacing + move;
+    const double add = SWEEPS_ADD * b->structure->spacing, near = add + move;
     b->near_links = b->near_angles = 0;
     for (int l = 0; l < b->links; l++) {
         if (!all && b->path + near < b->link_wake[l]) continue;
-        if (b->def.drive || link_near(b, l, x, near, !all))
+        const double own = all ? add : add + own_move(b, x, b->structure->link[l], 2);
+        if (b->def.drive || link_near(b, l, x, own, !all))
             b->near_link[b->near_links++] = l;
         else
             b->push[l][0] = b->push[l][1] = 0.0;
@@ -218,7 +230,8 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double m
     for (int t = 0; t < b->angles; t++) {
         morph_angle *a = &b->angle[t];
         if (!all && b->path + near < a->wake) continue;
-        if (angle_near(b, a, x, near, !all))
+        const double own = all ? add : add + own_move(b, x, a->joint, a->joints);
+        if (angle_near(b, a, x, own, !all))
             b->near_angle[b->near_angles++] = t;
         else
             a->push[0] = a->push[1] = 0.0;
@@ -353,5 +366,6 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, doubl
     morph_blanket_project_self(b, x, backward);
     for (int c = 0; c < b->contacts; c++)
         morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction);
+    if (b->soft) morph_blanket_soft_sweep(b, x, backward, friction);
     project_posts(b, x);
 }

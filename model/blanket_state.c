@@ -29,13 +29,15 @@ static bool def_ok(const morph_structure *s, const morph_blanket_def *d) {
                                  d->rise,    d->rise_time, d->softening, d->square};
     for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
         if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
+    if (d->body && !morph_body_finite(d->body)) return false;
     if (!finite3(d->velocity) || (d->rise > 0.0 && !(d->rise_time > 0.0)) || !arrays_ok(s, d)) return false;
     return isfinite(d->frame) && d->frame > 0.0 && (isnan(d->base) || isfinite(d->base));
 }
 
 static morph_status allocate(morph_blanket_state *b) {
     const size_t n = 3 * (size_t)b->joints;
-    double **const arrays[] = {&b->x, &b->v, &b->a, &b->before, &b->keep_x, &b->keep_v, &b->spare_x};
+    double **const arrays[] = {&b->x,      &b->v,      &b->a,       &b->before,
+                               &b->keep_x, &b->keep_v, &b->spare_x, &b->rest_x};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         if (!(*arrays[k] = morph_alloc(n, sizeof(double)))) return MORPH_ERR_NOMEM;
     if (!(b->weight = morph_alloc((size_t)b->joints, sizeof(double)))) return MORPH_ERR_NOMEM;
@@ -46,14 +48,15 @@ static morph_status allocate(morph_blanket_state *b) {
     morph_status status = morph_blanket_fix_create(b->structure, &b->fix);
     if (status == MORPH_OK) status = morph_blanket_self_create(b->structure, &b->self);
     if (status == MORPH_OK) status = morph_blanket_limits_create(b);
-    return status == MORPH_OK ? morph_blanket_touches_create(b) : status;
+    if (status == MORPH_OK) status = morph_blanket_touches_create(b);
+    return status == MORPH_OK ? morph_blanket_soft_create(b) : status;
 }
 
 morph_status morph_blanket_state_create(const morph_structure *s, const morph_sdf *sdf,
                                         const morph_blanket_def *def, const double *x0,
                                         morph_blanket_state **out) {
     *out = NULL;
-    if (!def_ok(s, def)) return MORPH_ERR_INPUT;
+    if (!def_ok(s, def) || (def->body && sdf)) return MORPH_ERR_INPUT;
     for (int k = 0; k < 3 * s->joints; k++)
         if (!isfinite(x0[k])) return MORPH_ERR_NONFINITE;
     morph_blanket_state *b = morph_alloc(1, sizeof *b);
@@ -85,7 +88,7 @@ morph_status morph_blanket_state_create(const morph_structure *s, const morph_sd
 
 void morph_blanket_state_destroy(morph_blanket_state *b) {
     if (!b) return;
-    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v, b->spare_x};
+    double *const arrays[] = {b->x, b->v, b->a, b->before, b->keep_x, b->keep_v, b->spare_x, b->rest_x};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
         free(arrays[k]);
     free(b->weight);
@@ -98,6 +101,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->angle);
     morph_blanket_fix_destroy(b->fix);
     morph_blanket_self_destroy(b->self);
+    morph_blanket_soft_destroy(b->soft);
     free(b->memo);
     free(b->touch);
     free(b->contact);

@@ -467,6 +467,26 @@ static void set_drag(morph_body_touch *t, const double want[3], double friction,
     }
 }
 
+static void move_both(const morph_body_contacts *c, const morph_body_touch *t, double *x, morph_body *body,
+                      const double change[3]) {
+    for (int j = 0; j < 3; j++)
+        for (int i = 0; i < 3; i++) {
+            x[3 * t->joint[j] + i] += t->weight[j] * c->inverse[t->joint[j]] * change[i];
+            body->x[3 * t->vertex[j] + i] -= t->body_weight[j] * body->inverse[t->vertex[j]] * change[i];
+        }
+}
+
+void morph_body_contact_start(morph_body_contacts *c, int k, double push, const double drag[3], double *x,
+                              morph_body *body, double friction) {
+    morph_body_touch *t = &c->touch[k];
+    double change[3];
+    t->push = push;
+    for (int i = 0; i < 3; i++)
+        change[i] = push * t->normal[i];
+    set_drag(t, drag, friction, change);
+    move_both(c, t, x, body, change);
+}
+
 /* q - s moves by push / inverse: sum w (w / m) + sum u (u / m). */
 void morph_body_contact_project(morph_body_contacts *c, int k, double *x, morph_body *body, double friction) {
     morph_body_touch *t = &c->touch[k];
@@ -482,11 +502,7 @@ void morph_body_contact_project(morph_body_contacts *c, int k, double *x, morph_
         want[i] = t->drag[i] - (d[i] - t->before[i]) * t->inverse;
     }
     if (friction > 0.0) set_drag(t, want, friction, change);
-    for (int j = 0; j < 3; j++)
-        for (int i = 0; i < 3; i++) {
-            x[3 * t->joint[j] + i] += t->weight[j] * c->inverse[t->joint[j]] * change[i];
-            body->x[3 * t->vertex[j] + i] -= t->body_weight[j] * body->inverse[t->vertex[j]] * change[i];
-        }
+    move_both(c, t, x, body, change);
 }
 
 void morph_body_contacts_force(const morph_body_contacts *c, double h, double force[3]) {

@@ -59,6 +59,10 @@ morph_status morph_body_contacts_find(morph_body_contacts *contacts, const doubl
 int morph_body_contacts_count(const morph_body_contacts *contacts);
 morph_body_touch *morph_body_contacts_list(morph_body_contacts *contacts); /* until the next find */
 
+/* Starts contact k, just found, with the corrections push (kg m, >= 0) and drag (cut to the cone) that it had
+ * in the step before. */
+void morph_body_contact_start(morph_body_contacts *contacts, int k, double push, const double drag[3],
+                              double *x, morph_body *body, double friction);
 /* Corrects x (joints) and body->x by contact k: unilateral along the normal, Coulomb friction across it.
  * friction: the coefficient. */
 void morph_body_contact_project(morph_body_contacts *contacts, int k, double *x, morph_body *body,

@@ -54,6 +54,10 @@ morph_status morph_tetra_create(int n, const double *v, int m, const int (*tet)[
 morph_status morph_tetra_fill(const morph_distance *target, double cell, morph_tetra *out,
                               morph_tetra_report *report);
 
+/* The surface with the mesh's vertices at x (3 * vertices; mesh->v for the shape as it is): the vertices of
+ * mesh->surface in their order, the triangles by numbers in that order. Owned by the caller. */
+morph_status morph_tetra_surface(const morph_tetra *mesh, const double *x, morph_mesh *out);
+
 /* Volumes and shape of one tetrahedron of a mesh with vertices at x. */
 static inline double morph_tetra_volume(const double *x, const int tet[4]) {
     double a[3], b[3], c[3], n[3];

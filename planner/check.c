@@ -113,6 +113,7 @@ static void conclude(const morph_record *r, const morph_findings *f, morph_check
     double nearest = INFINITY;
     out->feasible = f->defect[0] == 0;
     memcpy(out->defect, f->defect, sizeof out->defect);
+    out->clearance_at_end = r->deformed_v != NULL;
     out->clearance_resolution = f->clearance_resolution;
     out->interpolation = f->interpolation;
     for (int k = 0; k < MORPH_MARGIN_KINDS; k++) {

@@ -37,6 +37,7 @@ typedef struct morph_check_report {
     bool feasible; /* every tested margin holds */
     morph_margin margin[MORPH_MARGIN_KINDS];
     morph_margin_kind worst; /* the margin furthest beyond (or nearest to) its limit, relative to its scale */
+    bool clearance_at_end;   /* against a pressed target, at the end alone: it gives way on the way */
     double clearance_resolution; /* s: between-sample motion is bounded at this step */
     double interpolation; /* m: most that lengths of posts and links are off between samples, where joints are
                              interpolated */

@@ -1,4 +1,5 @@
-/* Distance of joints, link axes and skin to the target, less the link radius, over the whole motion.
+/* Distance of joints, link axes and skin to the target, less the link radius, over the whole motion. A
+ * deformable target gives way on the way: against it, its surface as pressed, at the end alone.
  * Separated distances are FCL's; where an element touches the mesh or lies inside it, its depth is our own.
  */
 #include "planner/check_parts.h"
@@ -10,6 +11,7 @@
 
 typedef struct clearance {
     const morph_record *r;
+    morph_mesh target;           /* the record's arrays */
     morph_motion joints, offset; /* offset.x is NULL when the target stands still */
     morph_solid *solid;
     morph_distance *exact;
@@ -37,12 +39,12 @@ static int compare_edges(const void *p, const void *q) {
 }
 
 /* Closed: every edge is used exactly twice, once in each direction. */
-static morph_status examine_closed(const morph_record *r, bool *closed) {
-    const size_t n = 3 * (size_t)r->target_triangles;
+static morph_status examine_closed(const morph_mesh *m, bool *closed) {
+    const size_t n = 3 * (size_t)m->triangles;
     edge *e = morph_alloc(n, sizeof *e);
     if (!e) return MORPH_ERR_NOMEM;
     for (size_t i = 0; i < n; i++) {
-        const int a = r->target_t[i], b = r->target_t[i % 3 == 2 ? i - 2 : i + 1];
+        const int a = m->t[i], b = m->t[i % 3 == 2 ? i - 2 : i + 1];
         e[i] = a < b ? (edge){a, b, 1} : (edge){b, a, 0};
     }
     qsort(e, n, sizeof *e, compare_edges);
@@ -57,27 +59,27 @@ static morph_status examine_closed(const morph_record *r, bool *closed) {
 }
 
 static morph_status target_create(clearance *c) {
-    const morph_record *r = c->r;
+    const morph_mesh *m = &c->target;
     for (int k = 0; k < 3; k++) {
         c->lo[k] = INFINITY;
         c->hi[k] = -INFINITY;
-        for (int i = 0; i < r->target_vertices; i++) {
-            c->lo[k] = fmin(c->lo[k], r->target_v[3 * (size_t)i + (size_t)k]);
-            c->hi[k] = fmax(c->hi[k], r->target_v[3 * (size_t)i + (size_t)k]);
+        for (int i = 0; i < m->vertices; i++) {
+            c->lo[k] = fmin(c->lo[k], m->v[3 * (size_t)i + (size_t)k]);
+            c->hi[k] = fmax(c->hi[k], m->v[3 * (size_t)i + (size_t)k]);
         }
     }
     bool closed = false;
-    morph_status status = examine_closed(r, &closed);
-    if (status == MORPH_OK)
-        status =
-            morph_solid_create(r->target_v, r->target_vertices, r->target_t, r->target_triangles, &c->solid);
-    const morph_mesh mesh = {r->target_vertices, r->target_triangles, r->target_v, r->target_t};
-    if (status == MORPH_OK) status = morph_distance_create(&mesh, closed, &c->exact);
+    morph_status status = examine_closed(m, &closed);
+    if (status == MORPH_OK) status = morph_solid_create(m->v, m->vertices, m->t, m->triangles, &c->solid);
+    if (status == MORPH_OK) status = morph_distance_create(m, closed, &c->exact);
     return status;
 }
 
 static morph_status clearance_create(const morph_record *r, clearance *c) {
     *c = (clearance){.r = r, .skin_radius = morph_check_radius(r)};
+    c->target = r->deformed_v
+                    ? (morph_mesh){r->deformed_vertices, r->deformed_triangles, r->deformed_v, r->deformed_t}
+                    : (morph_mesh){r->target_vertices, r->target_triangles, r->target_v, r->target_t};
     c->joint_radius = morph_alloc((size_t)r->joints, sizeof(double));
     if (!c->joint_radius) return MORPH_ERR_NOMEM;
     for (int i = 0; i < r->links; i++)
@@ -190,7 +192,7 @@ static void ends(clearance *c, morph_sweep *s, double *value, morph_finding *m) 
     int joint;
     for (int i = 0; i < element_count(c->r) && !s->failed; i++) {
         select_element(c, i, &joint);
-        for (int e = 0; e < 2; e++) {
+        for (int e = c->r->deformed_v ? 1 : 0; e < 2; e++) {
             const double v = clearance_value(c, e ? last : 0);
             value[2 * i + e] = v;
             if (isnan(v)) s->failed = true;
@@ -225,7 +227,7 @@ static morph_status search(clearance *c, const morph_control *control, double h,
     c->sweep = &s;
     ends(c, &s, value, m);
     int joint;
-    for (int i = 0; i < n && !s.failed && !s.exhausted; i++) {
+    for (int i = 0; i < n && !s.failed && !s.exhausted && !r->deformed_v; i++) {
         select_element(c, i, &joint);
         if (morph_sweep_run(&s, 0, value[2 * i], r->samples - 1, value[2 * i + 1])) m->a = c->element;
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
@@ -234,7 +236,7 @@ static morph_status search(clearance *c, const morph_control *control, double h,
     if (s.failed) return c->status == MORPH_OK ? MORPH_ERR_NONFINITE : c->status;
     m->worst = s.least;
     m->time = s.at * h;
-    f->clearance_resolution = s.finest * h;
+    f->clearance_resolution = r->deformed_v ? 0 : s.finest * h;
     if (s.exhausted) {
         char name[96];
         morph_element_name(r, c->element, name, sizeof name);

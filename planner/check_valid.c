@@ -128,6 +128,12 @@ static bool target(const morph_record *r, morph_findings *f) {
         return fault(f, "target/vertices is missing or not finite");
     if (!indices(r->target_t, 3 * (size_t)r->target_triangles, r->target_vertices))
         return fault(f, "target/triangles has an index out of range");
+    if (!r->deformed_v) return r->deformed_t ? fault(f, "deformed/vertices is missing") : true;
+    if (r->deformed_vertices < 3 || r->deformed_triangles < 1 ||
+        !all_usable(r->deformed_v, 3 * (size_t)r->deformed_vertices))
+        return fault(f, "deformed/vertices is empty or not finite");
+    if (!indices(r->deformed_t, 3 * (size_t)r->deformed_triangles, r->deformed_vertices))
+        return fault(f, "deformed/triangles has an index out of range");
     return true;
 }
 

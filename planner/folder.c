@@ -3,6 +3,7 @@
 
 #include "planner/folder_place.h"
 #include "planner/folder_text.h"
+#include "planner/import_tetra.h"
 #include "planner/report.h"
 #include "planner/schedule_file.h"
 #include "planner/sha256.h"
@@ -111,6 +112,23 @@ static morph_status name_mesh(job *j) {
     return MORPH_OK;
 }
 
+/* The other file of a TetGen pair, under its own name: its ending is that of none of ours. */
+static morph_status put_sibling(const job *j) {
+    const morph_target_def *def = &j->scene->target_def;
+    char *path = NULL, *data;
+    size_t size;
+    if (!def->has_deformable) return MORPH_OK;
+    morph_status status = morph_tetra_sibling(def->file, &path);
+    if (status != MORPH_OK) return out_of_memory(j);
+    if (!path) return MORPH_OK;
+    const char *slash = strrchr(path, '/');
+    status = morph_file_load(path, &data, &size, j->message, j->size);
+    if (status == MORPH_OK) status = put(j, slash ? slash + 1 : path, data, size);
+    free(data);
+    free(path);
+    return status;
+}
+
 static morph_status put_scene(job *j) {
     morph_status status = name_mesh(j);
     if (status != MORPH_OK) return status;
@@ -121,6 +139,7 @@ static morph_status put_scene(job *j) {
         if (status != MORPH_OK) return status;
         status = put(j, j->mesh, data, size);
         free(data);
+        if (status == MORPH_OK) status = put_sibling(j);
         if (status != MORPH_OK) return status;
     }
     char *yaml = NULL;

@@ -1,5 +1,7 @@
 #include "planner/import.h"
 #include "planner/import_private.h"
+#include "planner/import_tetra.h"
+#include "planner/target_body.h"
 
 #include <float.h>
 #include <stdarg.h>
@@ -151,9 +153,28 @@ static morph_status judge(const morph_mesh_report *r, const morph_sentence *to, 
     return MORPH_OK;
 }
 
+/* The surface of a file of tetrahedra; their inside is read again where the body is made. */
+static morph_status tetra_surface(const morph_target_def *def, const morph_sentence *sentence,
+                                  morph_mesh *mesh, morph_mesh_report *report, char *warning, size_t size) {
+    morph_tetra tetra;
+    morph_tetra_report found;
+    morph_status status =
+        morph_import_tetra(def->file, sentence->name, &tetra, &found, sentence->text, sentence->size);
+    if (status != MORPH_OK) return status;
+    if (found.flipped > 0)
+        warn(warning, size, "'%s': %d of %d tetrahedra were turned", sentence->name, found.flipped,
+             tetra.tets);
+    status = morph_tetra_surface(&tetra, tetra.v, mesh);
+    morph_tetra_free(&tetra);
+    if (status == MORPH_OK) status = morph_mesh_examine(mesh, report);
+    return status == MORPH_OK ? judge(report, sentence, 0, warning, size) : status;
+}
+
 static morph_status file_mesh(const morph_target_def *def, const morph_sentence *sentence, morph_mesh *mesh,
                               morph_mesh_report *report, char *warning, size_t size) {
     int crossing = 0;
+    if (def->has_deformable && morph_is_tetra_file(def->file))
+        return tetra_surface(def, sentence, mesh, report, warning, size);
     morph_status status = morph_import_mesh(def->file, sentence, mesh, &crossing);
     if (status != MORPH_OK) return status;
     for (int i = 0; i < 3 * mesh->vertices; i++)
@@ -293,5 +314,21 @@ morph_status morph_target_build(const morph_target_def *def, double spacing, mor
         *report = (morph_mesh_report){0};
         if (warning && warning_size > 0) warning[0] = '\0';
     }
+    return status;
+}
+
+morph_status morph_target_tetra(const morph_target_def *def, morph_tetra *out, char *message,
+                                size_t message_size) {
+    const morph_sentence sentence = {message, message_size,
+                                     def->file_as_written ? def->file_as_written : def->file};
+    morph_tetra_report found;
+    morph_mesh_report unused = {0};
+    morph_status status = morph_import_tetra(def->file, sentence.name, out, &found, message, message_size);
+    if (status != MORPH_OK) return status;
+    /* Only vertices are moved; all lie within the surface's box. */
+    morph_mesh vertices = {.vertices = out->vertices, .v = out->v};
+    rotate(&vertices, def->rotate);
+    status = place(def, scale_of(def, &vertices), &vertices, &unused, &sentence);
+    if (status != MORPH_OK) morph_tetra_free(out);
     return status;
 }

@@ -317,10 +317,10 @@ static void ending_of(const char *path, char out[8]) {
 static morph_status check_ending(const char *ending, const morph_sentence *to) {
     for (size_t i = 0; i < sizeof ENDINGS / sizeof *ENDINGS; i++)
         if (strcmp(ending, ENDINGS[i]) == 0) return MORPH_OK;
-    if (strcmp(ending, "msh") == 0)
+    if (strcmp(ending, "msh") == 0 || strcmp(ending, "node") == 0 || strcmp(ending, "ele") == 0)
         return morph_refuse(to,
-                            "'%s' is a Gmsh file, which is not read; targets are surface meshes: STL, OBJ, "
-                            "PLY, OFF or glTF",
+                            "'%s' is a mesh of tetrahedra (Gmsh or TetGen), which is read for a deformable "
+                            "target only; rigid targets are surface meshes: STL, OBJ, PLY, OFF or glTF",
                             to->name);
     return morph_refuse(to,
                         "'%s' is no mesh file by its ending; .stl, .obj, .ply, .off, .gltf and .glb "

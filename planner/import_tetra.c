@@ -120,6 +120,14 @@ static char *with_ending(const char *name, const char *ending) {
     return out;
 }
 
+morph_status morph_tetra_sibling(const char *path, char **sibling) {
+    *sibling = NULL;
+    const bool node = strcasecmp(ending_of(path), "node") == 0, ele = strcasecmp(ending_of(path), "ele") == 0;
+    if (!node && !ele) return MORPH_OK;
+    *sibling = with_ending(path, node ? "ele" : "node");
+    return *sibling ? MORPH_OK : MORPH_ERR_NOMEM;
+}
+
 typedef enum part { PART_MSH, PART_NODE, PART_ELE } part;
 
 static morph_status read_part(const char *path, const morph_sentence *sentence, part which, int *base,

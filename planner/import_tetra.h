@@ -8,6 +8,9 @@
 /* Whether a file name ends like one of these formats. */
 bool morph_is_tetra_file(const char *path);
 
+/* The other file of a TetGen pair (caller frees); NULL where the name is not of one. */
+morph_status morph_tetra_sibling(const char *path, char **sibling);
+
 /* Reads the file's tetrahedra (of second-order ones the corners); what else it holds is passed over, but
  * other solid elements are refused. Of a TetGen pair either file may be named. name: the file as the user
  * wrote it. Negative tetrahedra are turned, vertices of none are dropped: see *report. Coordinates stay the

@@ -38,6 +38,7 @@ static bool drawable(const morph_record *r) {
     morph_motion schedule = morph_motion_schedule(r), nominal = morph_motion_nominal(r);
     return motion_finite(r, &schedule) && motion_finite(r, &nominal) &&
            all_finite(r->target_v, 3 * (size_t)r->target_vertices) &&
+           all_finite(r->deformed_v, 3 * (size_t)r->deformed_vertices) &&
            all_finite(&r->length_limit[0][0], 2 * (size_t)r->links) &&
            all_finite(r->link_radius, (size_t)r->links) && isfinite(r->spacing) && r->spacing > 0;
 }
@@ -232,6 +233,17 @@ static morph_status draw_page(cairo_t *c, const morph_record *r, const char *tit
     return status;
 }
 
+/* The record with a deformable target as it is at the end. Borrows everything. */
+static morph_record pressed(const morph_record *r) {
+    morph_record end = *r;
+    if (!r->deformed_v || !r->deformed_t) return end;
+    end.target_vertices = r->deformed_vertices;
+    end.target_triangles = r->deformed_triangles;
+    end.target_v = r->deformed_v;
+    end.target_t = r->deformed_t;
+    return end;
+}
+
 /* One panel of the page, for embedding. */
 static morph_status draw_panel(cairo_t *c, const morph_record *r, int panel, const morph_box *box) {
     morph_motion m = morph_motion_schedule(r), nominal = morph_motion_nominal(r);
@@ -257,12 +269,13 @@ static morph_status draw_panel(cairo_t *c, const morph_record *r, int panel, con
         room = (morph_box){box->x + 10, box->y + 10, box->width - 20, box->height - 20};
         morph_view_fit(&view, &bounds, &room);
     }
-    morph_status status = morph_relief_create(r, &view, &relief);
+    const morph_record shown = panel >= 3 ? pressed(r) : *r;
+    morph_status status = morph_relief_create(&shown, &view, &relief);
     if (status == MORPH_OK && panel < 4) {
-        status = draw_moment(c, r, which, panel, box, &view, &relief);
+        status = draw_moment(c, &shown, which, panel, box, &view, &relief);
     } else if (status == MORPH_OK) {
         int end = which->frames - 1;
-        status = morph_draw_pose(c, r, joints_at(r, which, end), offset_at(which, end), &view, &relief);
+        status = morph_draw_pose(c, &shown, joints_at(r, which, end), offset_at(which, end), &view, &relief);
     }
     morph_relief_free(&relief);
     return status;

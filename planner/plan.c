@@ -30,15 +30,19 @@ static void note_time(planner *p, morph_stage stage, double since) {
     p->plan->summary.seconds[stage] += morph_seconds() - since;
 }
 
+static void note_accuracy(planner *p) {
+    morph_summary *s = &p->plan->summary;
+    s->sdf_cell = p->work.accuracy.cell;
+    s->sdf_rms = p->work.accuracy.rms;
+    s->sdf_max = p->work.accuracy.max;
+}
+
 static morph_status stage_target(planner *p) {
     const double since = morph_seconds();
-    morph_summary *s = &p->plan->summary;
     morph_progress(control_of(p), "target", 0.0);
     morph_status status = morph_workspace_create(p->scene, control_of(p), &p->work);
     if (status == MORPH_OK) {
-        s->sdf_cell = p->work.accuracy.cell;
-        s->sdf_rms = p->work.accuracy.rms;
-        s->sdf_max = p->work.accuracy.max;
+        note_accuracy(p);
         status =
             morph_record_structure(&p->plan->record, p->work.structure, &p->scene->target, p->scene->base);
     }
@@ -82,13 +86,61 @@ static void note_held_up(planner *p) {
     morph_log(control_of(p), "nominal: %s", text);
 }
 
+/* What the blanket has made of the target: later stages see that, as a rigid one. */
+static morph_status press(planner *p, const morph_body *body) {
+    morph_summary *s = &p->plan->summary;
+    const double lift = p->nominal.lift[p->nominal.frames - 1];
+    morph_mesh surface;
+    morph_status status = morph_tetra_surface(&body->mesh, body->x, &surface);
+    for (int i = 0; i < surface.vertices; i++)
+        surface.v[3 * i + 2] -= lift; /* to the target's place, as the target's own vertices stand */
+    if (status == MORPH_OK) status = morph_record_deformed(&p->plan->record, &surface);
+    if (status == MORPH_OK) status = morph_workspace_press(&p->work, p->scene, &surface, &p->quiet);
+    morph_mesh_free(&surface);
+    note_accuracy(p);
+    s->deformable.pressed = morph_target_pressed(body, lift);
+    s->deformable.least_volume = morph_body_least_volume(body);
+    s->deformable.worst_depth = s->blanket_report.worst_clearance;
+    return status;
+}
+
+/* Beside what else there is to say. */
+static void note_deformable(planner *p) {
+    morph_summary *s = &p->plan->summary;
+    const size_t used = strlen(s->warning);
+    snprintf(s->warning + used, sizeof s->warning - used,
+             "%sthe target is deformable: it is pressed by up to %.3g m; gap, cavity and coverage are to its "
+             "pressed surface, clearance is to that and at the end only, as it gives way before",
+             used > 0 ? "; " : "", s->deformable.pressed);
+}
+
+/* The pure blanket on a deformable target: both move. */
+static morph_status run_deformable(planner *p, morph_blanket_def def) {
+    char message[512];
+    morph_summary *s = &p->plan->summary;
+    morph_status status =
+        morph_target_body(p->scene, p->work.exact, &def.body, &s->deformable, message, sizeof message);
+    if (message[0]) morph_log(control_of(p), "target.deformable: %s", message);
+    if (status != MORPH_OK) return status;
+    status = morph_blanket_run(p->work.structure, NULL, NULL, &def, p->work.start, control_of(p), &p->nominal,
+                               &s->blanket_report);
+    const morph_status pressed = (status == MORPH_OK || status == MORPH_ERR_STOPPED) && p->nominal.frames > 0
+                                     ? press(p, def.body)
+                                     : MORPH_OK;
+    morph_body_destroy(def.body);
+    return pressed == MORPH_OK ? status : pressed;
+}
+
 static morph_status stage_nominal(planner *p) {
     const double since = morph_seconds();
-    const morph_structure *st = p->work.structure;
-    const morph_blanket_def def = morph_scene_blanket(p->scene, st);
+    const morph_blanket_def def = morph_scene_blanket(p->scene, p->work.structure);
     morph_summary *s = &p->plan->summary;
-    morph_status status = morph_blanket_run(st, p->work.sdf, p->work.exact, &def, p->work.start,
-                                            control_of(p), &p->nominal, &s->blanket_report);
+    morph_status status =
+        p->scene->target_def.has_deformable
+            ? run_deformable(p, def)
+            : morph_blanket_run(p->work.structure, p->work.sdf, p->work.exact, &def, p->work.start,
+                                control_of(p), &p->nominal, &s->blanket_report);
+    const morph_structure *st = p->work.structure;
     if (status == MORPH_ERR_STOPPED && p->nominal.frames > 0) {
         p->stopped = true;
         status = MORPH_OK;
@@ -104,6 +156,7 @@ static morph_status stage_nominal(planner *p) {
         s->has_blanket = status == MORPH_OK;
     }
     if (status == MORPH_OK && s->blanket_report.held_up) note_held_up(p);
+    if (status == MORPH_OK && s->deformable.used) note_deformable(p);
     note_time(p, MORPH_STAGE_NOMINAL, since);
     return status;
 }

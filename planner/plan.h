@@ -30,7 +30,7 @@ void morph_plan_destroy(morph_plan *plan);
 typedef struct morph_workspace {
     morph_structure *structure;
     morph_distance *exact;
-    morph_sdf *sdf;
+    morph_sdf *sdf; /* NULL for a deformable target, until it is pressed */
     morph_cavity *cavity;
     morph_world world;
     double *start; /* 3*joints: flat, at the drop height above the target or in its frame */
@@ -38,6 +38,10 @@ typedef struct morph_workspace {
 } morph_workspace;
 morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,
                                     morph_workspace *out);
+/* Puts the surface that a deformable target was pressed to in the target's place, as a rigid one: distances,
+ * their grid and the cavity from here on are to it. The start stays where it is. */
+morph_status morph_workspace_press(morph_workspace *w, const morph_scene *scene, const morph_mesh *surface,
+                                   const morph_control *control);
 void morph_workspace_free(morph_workspace *w);
 /* What drives the pure blanket; points into scene and structure. */
 morph_blanket_def morph_scene_blanket(const morph_scene *scene, const morph_structure *structure);
@@ -45,6 +49,8 @@ morph_blanket_def morph_scene_blanket(const morph_scene *scene, const morph_stru
 /* Copies the structure and target into the record, and a curve with its timing as samples. */
 morph_status morph_record_structure(morph_record *r, const morph_structure *s, const morph_mesh *target,
                                     double base);
+/* The surface of a deformable target at the end of the nominal run. */
+morph_status morph_record_deformed(morph_record *r, const morph_mesh *surface);
 morph_status morph_record_nominal(morph_record *r, const morph_structure *s, const morph_trajectory *t);
 morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, const morph_timing *timing,
                                    double sample);

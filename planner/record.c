@@ -28,6 +28,8 @@ void morph_record_free(morph_record *r) {
                             r->fixed,
                             r->target_v,
                             r->target_t,
+                            r->deformed_v,
+                            r->deformed_t,
                             r->offset_nominal,
                             r->offset_schedule,
                             r->nominal_time,

@@ -36,6 +36,10 @@ typedef struct morph_record {
     int *target_t;
     double *offset_nominal;  /* nominal_frames x 3 */
     double *offset_schedule; /* samples x 3 */
+    /* deformed/: the surface of a deformable target at the end of nominal/ */
+    int deformed_vertices, deformed_triangles;
+    double *deformed_v;
+    int *deformed_t;
     /* nominal/ */
     int nominal_frames;
     double *nominal_time, *nominal_joints, *nominal_lengths;

@@ -44,6 +44,14 @@ morph_status morph_record_structure(morph_record *r, const morph_structure *s, c
     return ok ? MORPH_OK : MORPH_ERR_NOMEM;
 }
 
+morph_status morph_record_deformed(morph_record *r, const morph_mesh *surface) {
+    r->deformed_vertices = surface->vertices;
+    r->deformed_triangles = surface->triangles;
+    const bool ok = COPY(r->deformed_v, surface->v, 3 * surface->vertices) &&
+                    COPY(r->deformed_t, surface->t, 3 * surface->triangles);
+    return ok ? MORPH_OK : MORPH_ERR_NOMEM;
+}
+
 morph_status morph_record_nominal(morph_record *r, const morph_structure *s, const morph_trajectory *t) {
     const size_t width = 3 * (size_t)s->joints;
     r->nominal_frames = t->frames;

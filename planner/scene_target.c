@@ -234,7 +234,7 @@ static void check_place(const morph_scene_reader *r, const morph_value *at) {
         morph_number_print(scene->base, base);
         morph_value_fault(at, "the target ends at height %s, below the base, allowed: above %s", top, base);
     }
-    /* The rising target starts below the blanket in its frame; a height of 0 has its own fault. */
+    /* The rising target starts below the blanket in its frame. */
     if (scene->motion.mode == MORPH_MODE_RISE && scene->motion.height > 0.0 && !isnan(scene->base) &&
         report->hi[2] - scene->motion.height > scene->base) {
         morph_number_print(scene->motion.height, top);
@@ -277,6 +277,14 @@ morph_status morph_scene_build_target(morph_scene_reader *r, const morph_value *
         return MORPH_ERR_INPUT;
     }
     if (status != MORPH_OK) return status;
+    if (scene->target_def.has_deformable && !scene->target_report.closed) {
+        const morph_value soft = morph_value_get(&map, "deformable");
+        morph_value_fault(&soft,
+                          "the target's surface is open (%d boundary edges) and has no inside to fill, "
+                          "allowed: a closed one, or no deformable",
+                          scene->target_report.boundary_edges);
+        return MORPH_ERR_INPUT;
+    }
     place(r);
     const morph_value at = morph_value_get(&map, "at");
     check_place(r, at.node ? &at : where);

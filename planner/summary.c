@@ -161,6 +161,20 @@ static void put_seconds(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, root, "peak_memory_bytes", (double)s->peak_memory_bytes);
 }
 
+static void put_deformable(builder *b, cJSON *root, const morph_deformable_report *r) {
+    if (!r->used) {
+        keep(b, cJSON_AddNullToObject(root, "deformable"));
+        return;
+    }
+    cJSON *body = put_object(b, root, "deformable");
+    put_number(b, body, "vertices", r->vertices);
+    put_number(b, body, "tetrahedra", r->tetrahedra);
+    put_number(b, body, "volume", r->volume);
+    put_number(b, body, "pressed", r->pressed);
+    put_number(b, body, "least_volume", r->least_volume);
+    put_number(b, body, "worst_depth", r->worst_depth);
+}
+
 static void put_details(builder *b, cJSON *root, const morph_summary *s) {
     const morph_blanket_report *r = &s->blanket_report;
     cJSON *run = put_object(b, root, "blanket_run");
@@ -190,6 +204,7 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_text(b, root, "reason", s->reason);
     put_number(b, root, "spacing", s->spacing);
     put_measures(b, root, s);
+    put_deformable(b, root, &s->deformable);
     put_margins(b, root, s);
     put_replay(b, root, "replay", &s->replay);
     put_replay(b, root, "replay_core", &s->replay_core);

@@ -6,6 +6,7 @@
 #include "model/cavity.h"
 #include "planner/check.h"
 #include "planner/replay.h"
+#include "planner/target_body.h"
 
 enum { MORPH_STAGES = 9 };
 typedef enum morph_stage {
@@ -43,6 +44,7 @@ typedef struct morph_summary {
     long peak_memory_bytes;
     morph_blanket_report blanket_report;
     morph_replay_report replay, replay_core; /* without the target, and with it as a solid */
+    morph_deformable_report deformable;
     double sdf_cell, sdf_rms, sdf_max;
     char blas[64]; /* BLAS kernel name, "" if unknown */
     char warning[512];

@@ -73,6 +73,8 @@ char *morph_check_text(const morph_check_report *r, bool whole, const char *file
     for (int k = 0; k < MORPH_MARGIN_KINDS && !r->defect[0]; k++)
         margin_line(out, (morph_margin_kind)k, &r->margin[k],
                     lengths_only ? "not tested: a schedule file holds lengths only" : "not in this plan");
+    if (!lengths_only && r->clearance_at_end)
+        fprintf(out, "clearance is to the pressed target at the end: a deformable one gives way before\n");
     if (files)
         fputs(files, out);
     else if (whole)

@@ -39,10 +39,12 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
     if (status == MORPH_OK && !(w->start = morph_alloc(3 * (size_t)s->joints, sizeof(double))))
         status = MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
-        double lo[3], hi[3];
         const double height = start_height(scene);
         for (int i = 0; i < 3 * s->joints; i++)
             w->start[i] = s->start[i] + (i % 3 == 2 ? height : 0.0);
+    }
+    if (status == MORPH_OK && !scene->target_def.has_deformable) {
+        double lo[3], hi[3];
         field_box(scene, s, w->start, lo, hi);
         /* A sixteenth of the spacing is about the links' radius; beyond 2.5 million nodes memory and time
          * outgrow the gain: the rows' bias makes up for what a coarser field misses. */
@@ -51,7 +53,7 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
         status = morph_sdf_create(w->exact, lo, hi, cell, control, &w->sdf);
     }
     if (status == MORPH_OK) {
-        morph_sdf_measure(w->sdf, w->exact, s->spacing, &w->accuracy);
+        if (w->sdf) morph_sdf_measure(w->sdf, w->exact, s->spacing, &w->accuracy);
         status = morph_cavity_create(s, w->exact, scene->base, &w->cavity);
     }
     if (status != MORPH_OK) {
@@ -59,6 +61,23 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
         return status;
     }
     w->world = (morph_world){s, w->exact, w->sdf, w->cavity, scene->base};
+    return MORPH_OK;
+}
+
+morph_status morph_workspace_press(morph_workspace *w, const morph_scene *scene, const morph_mesh *surface,
+                                   const morph_control *control) {
+    morph_scene pressed = *scene; /* borrows; only its target differs */
+    morph_workspace fresh;
+    pressed.target = *surface;
+    pressed.target_def.has_deformable = false;
+    morph_status status = morph_mesh_examine(surface, &pressed.target_report);
+    if (status == MORPH_OK) status = morph_workspace_create(&pressed, control, &fresh);
+    if (status != MORPH_OK) return status;
+    double *start = fresh.start;
+    fresh.start = w->start;
+    w->start = start;
+    morph_workspace_free(w);
+    *w = fresh;
     return MORPH_OK;
 }
 

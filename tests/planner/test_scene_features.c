@@ -199,11 +199,10 @@ static void test_attractors(void **state) {
 static void test_rise_and_deformable(void **state) {
     (void)state;
     /* In rise the height is a travel: it may be less than a link's radius. */
-    morph_scene *scene = scene_with(", fixed: border",
-                                    ", at: [0, 0, -0.0485], deformable: {young: 2.0e4, density: "
-                                    "300}}\nmotion: {mode: rise, height: 0.002}");
+    morph_scene *scene = scene_with(
+        ", fixed: border", ", deformable: {young: 2.0e4, density: 300}}\nmotion: {mode: rise, height: 0.11}");
     assert_int_equal(scene->motion.mode, MORPH_MODE_RISE);
-    assert_true(scene->motion.height == 0.002);
+    assert_true(scene->motion.height == 0.11);
     assert_true(scene->target_def.has_deformable);
     assert_true(scene->target_def.young == 2e4 && scene->target_def.density == 300.0);
     assert_round_trip(scene);
