@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 morph_job morph_job_defaults(void) {
@@ -88,6 +89,84 @@ static int refuse_unsupported(const morph_scene *scene, const morph_job *job) {
     return MORPH_EXIT_INPUT;
 }
 
+/* Writes the plan and says what came of it. */
+static int write_plan(const morph_scene *scene, const char *folder, bool overwrite, const morph_plan *plan,
+                      const morph_job *job, char **text, char **json) {
+    char message[512] = "";
+    const morph_summary *summary = &plan->summary;
+    const morph_status status =
+        morph_folder_write(folder, overwrite, scene, &plan->record, summary, message, sizeof message);
+    if (status != MORPH_OK) {
+        say(job, message);
+        return exit_of(status);
+    }
+    if (text) *text = morph_plan_text(summary, folder);
+    if (json && morph_summary_to_json(summary, json) != MORPH_OK) *json = NULL;
+    if (strcmp(summary->outcome, "stopped") == 0) return MORPH_EXIT_STOPPED;
+    if (summary->feasible) return MORPH_EXIT_DONE;
+    char line[600];
+    snprintf(line, sizeof line, "morphplan: infeasible: %s", summary->reason);
+    say(job, line);
+    return MORPH_EXIT_INFEASIBLE;
+}
+
+/* "box.plan/" -> "box.plan.stopped"; a folder that is told as "." or ".." goes by its own name. */
+static char *stopped_folder(const char *folder) {
+    size_t n = strlen(folder);
+    while (n > 1 && folder[n - 1] == '/')
+        n--;
+    const bool dots = folder[n - 1] == '.' && (n == 1 || folder[n - 2] == '/' ||
+                                               (folder[n - 2] == '.' && (n == 2 || folder[n - 3] == '/')));
+    char *real = dots ? realpath(folder, NULL) : NULL;
+    if (dots && !real) return NULL;
+    if (real) n = strlen(real);
+    char *name = malloc(n + sizeof ".stopped");
+    if (name) {
+        memcpy(name, real ? real : folder, n);
+        memcpy(name + n, ".stopped", sizeof ".stopped");
+    }
+    free(real);
+    return name;
+}
+
+/* Nothing there, or a plan that was stopped: that may be replaced. */
+static morph_status may_hold_stopped(const char *folder, char *message, size_t size) {
+    struct stat info;
+    if (lstat(folder, &info) != 0) return MORPH_OK;
+    morph_record record;
+    const morph_status status = morph_folder_read(folder, &record, NULL, 0);
+    const bool stopped = status == MORPH_OK && strcmp(record.outcome, "stopped") == 0;
+    if (status == MORPH_OK) morph_record_free(&record);
+    if (stopped || status == MORPH_ERR_NOMEM) return status;
+    snprintf(message, size, "%.400s: is there already and no stopped plan: the best so far is not written",
+             folder);
+    return MORPH_ERR_INPUT;
+}
+
+/* A stopped plan never takes the place of one that ran to its end: it goes beside. */
+static int write_beside(const morph_scene *scene, const char *folder, const morph_plan *plan,
+                        const morph_job *job, char **text, char **json) {
+    char message[1200] = "", *beside = stopped_folder(folder);
+    if (!beside) return fail(job, folder, MORPH_ERR_NOMEM);
+    const morph_status status = may_hold_stopped(beside, message, sizeof message);
+    int code = MORPH_EXIT_STOPPED;
+    if (status == MORPH_OK) {
+        code = write_plan(scene, beside, true, plan, job, text, json);
+        if (code == MORPH_EXIT_STOPPED)
+            snprintf(message, sizeof message,
+                     "morphplan: stopped: %.500s stays as it was, the best so far is in %.500s", folder,
+                     beside);
+        say(job, message);
+    } else if (message[0]) {
+        say(job, message);
+        code = exit_of(status);
+    } else {
+        code = fail(job, beside, status);
+    }
+    free(beside);
+    return code;
+}
+
 static int plan_into(const morph_scene *scene, const char *folder, const morph_job *job, char **text,
                      char **json) {
     const morph_control control = {job->stop, job->progress, job->log, job->user};
@@ -103,25 +182,10 @@ static int plan_into(const morph_scene *scene, const char *folder, const morph_j
     morph_plan *plan = NULL;
     status = morph_plan_run(scene, &options, &plan);
     if (status != MORPH_OK) return fail(job, scene->file, status);
-    int code = MORPH_EXIT_DONE;
-    status = morph_folder_write(folder, job->overwrite, scene, &plan->record, &plan->summary, message,
-                                sizeof message);
-    if (status != MORPH_OK) {
-        say(job, message);
-        code = exit_of(status);
-    } else {
-        if (text) *text = morph_plan_text(&plan->summary, folder);
-        if (json && morph_summary_to_json(&plan->summary, json) != MORPH_OK) *json = NULL;
-        if (strcmp(plan->summary.outcome, "stopped") == 0)
-            code = MORPH_EXIT_STOPPED;
-        else if (!plan->summary.feasible)
-            code = MORPH_EXIT_INFEASIBLE;
-        if (code == MORPH_EXIT_INFEASIBLE) {
-            char line[600];
-            snprintf(line, sizeof line, "morphplan: infeasible: %s", plan->summary.reason);
-            say(job, line);
-        }
-    }
+    struct stat info;
+    const bool beside = strcmp(plan->summary.outcome, "stopped") == 0 && lstat(folder, &info) == 0;
+    const int code = beside ? write_beside(scene, folder, plan, job, text, json)
+                            : write_plan(scene, folder, job->overwrite, plan, job, text, json);
     morph_plan_destroy(plan);
     return code;
 }
@@ -158,7 +222,7 @@ static morph_status check_schedule_file(const morph_record *record, const char *
 
 int morph_check_folder(const char *folder, const char *schedule, const morph_job *job, char **text) {
     if (text) *text = NULL;
-    char message[512] = "";
+    char message[512] = "", *files = NULL;
     morph_record record = {0};
     morph_check_report report = {0};
     morph_blas_threads(1);
@@ -172,16 +236,20 @@ int morph_check_folder(const char *folder, const char *schedule, const morph_job
         status = check_schedule_file(&record, schedule, message, sizeof message, &report);
     else if (status == MORPH_OK) {
         const morph_control control = {job->stop, job->progress, job->log, job->user};
-        status = morph_check_record(&record, &control, &report);
+        status = morph_folder_verify(folder, &record, &files, message, sizeof message);
+        if (status == MORPH_OK) status = morph_check_record(&record, &control, &report);
     }
     morph_record_free(&record);
     if (status != MORPH_OK) {
+        free(files);
         if (!message[0]) return fail(job, folder, status);
         say(job, message);
         return exit_of(status);
     }
-    if (text) *text = morph_check_text(&report);
-    return report.feasible ? MORPH_EXIT_DONE : MORPH_EXIT_INFEASIBLE;
+    if (text) *text = morph_check_text(&report, !schedule, files);
+    const bool good = report.feasible && !files;
+    free(files);
+    return good ? MORPH_EXIT_DONE : MORPH_EXIT_INFEASIBLE;
 }
 
 int morph_picture_folder(const char *folder, const char *file, const morph_job *job) {

@@ -78,6 +78,36 @@ static double ranking(morph_margin_kind kind, const morph_finding *f) {
     return inside >= 0 && equality(kind) ? inside / f->tolerance : inside / f->scale;
 }
 
+/* Can the interpolation of joints between samples have made the finding? Its error is known as that of
+ * lengths, so a joint's place is off by about as much; ten times that allows for several joints in one margin
+ * and for looking at some poses only. An error below the tolerance of lengths at the samples is none. */
+static bool made_by_interpolation(const morph_record *r, const morph_findings *f, morph_margin_kind kind) {
+    const morph_margin_kind pose[] = {MORPH_MARGIN_PANEL,     MORPH_MARGIN_LINK_POST,
+                                      MORPH_MARGIN_LINK_LINK, MORPH_MARGIN_CLEARANCE,
+                                      MORPH_MARGIN_BASE,      MORPH_MARGIN_SELF_CLEARANCE};
+    bool moved = false;
+    for (size_t k = 0; k < sizeof pose / sizeof *pose; k++)
+        moved |= kind == pose[k];
+    if (!moved || f->interpolation <= 1e-6 * r->spacing) return false;
+    /* An angle's or a sine's amount in metres: by the shortest member that can span it. */
+    double across = 1;
+    if (kind == MORPH_MARGIN_PANEL || kind == MORPH_MARGIN_LINK_POST || kind == MORPH_MARGIN_LINK_LINK) {
+        across = r->spacing;
+        for (int i = 0; i < r->links; i++)
+            across = fmin(across, r->length_limit[i][0]);
+        for (int i = 0; i < r->posts; i++)
+            across = fmin(across, r->post_length[i]);
+    }
+    return -f->kind[kind].worst * across <= 10 * f->interpolation;
+}
+
+const char *morph_check_hint(const morph_check_report *report) {
+    return report->coarse
+               ? "; joints between samples are interpolated: a finer schedule.sample may show that "
+                 "it holds"
+               : "";
+}
+
 /* Turns findings into the report. */
 static void conclude(const morph_record *r, const morph_findings *f, morph_check_report *out) {
     double nearest = INFINITY;
@@ -85,6 +115,7 @@ static void conclude(const morph_record *r, const morph_findings *f, morph_check
     memcpy(out->defect, f->defect, sizeof out->defect);
     out->clearance_at_end = r->deformed_v != NULL;
     out->clearance_resolution = f->clearance_resolution;
+    out->interpolation = f->interpolation;
     for (int k = 0; k < MORPH_MARGIN_KINDS; k++) {
         const morph_finding *from = &f->kind[k];
         morph_margin *to = &out->margin[k];
@@ -99,6 +130,9 @@ static void conclude(const morph_record *r, const morph_findings *f, morph_check
             out->worst = (morph_margin_kind)k;
         }
     }
+    const morph_margin *worst = &out->margin[out->worst];
+    out->coarse = nearest < INFINITY && !out->defect[0] && !(worst->worst >= -worst->tolerance) &&
+                  made_by_interpolation(r, f, out->worst);
 }
 
 morph_status morph_check_record(const morph_record *record, const morph_control *control,
@@ -125,7 +159,8 @@ morph_status morph_check_lengths(const morph_record *record, const double *time,
     memset(out, 0, sizeof *out);
     morph_findings f;
     memset(&f, 0, sizeof f);
-    if (morph_check_structure(record, &f)) morph_check_table(record, time, length, samples, &f);
-    conclude(record, &f, out);
-    return MORPH_OK;
+    morph_status status = MORPH_OK;
+    if (morph_check_structure(record, &f)) status = morph_check_table(record, time, length, samples, &f);
+    if (status == MORPH_OK) conclude(record, &f, out);
+    return status;
 }

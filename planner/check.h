@@ -39,9 +39,15 @@ typedef struct morph_check_report {
     morph_margin_kind worst; /* the margin furthest beyond (or nearest to) its limit, relative to its scale */
     bool clearance_at_end;   /* against a pressed target, at the end alone: it gives way on the way */
     double clearance_resolution; /* s: between-sample motion is bounded at this step */
-    char defect[256]; /* not empty: the record itself is unusable (sizes, NaN, time not even, start not at
-                         rest ...); feasible is false */
+    double interpolation; /* m: most that lengths of posts and links are off between samples, where joints are
+                             interpolated */
+    bool coarse;          /* the worst margin fails by no more than that error can explain */
+    char defect[256];     /* not empty: the record itself is unusable (sizes, NaN, time not even, start not at
+                             rest ...); feasible is false */
 } morph_check_report;
+
+/* What to say after a finding: "" or, of a coarse report, a clause that begins with "; ". */
+const char *morph_check_hint(const morph_check_report *report);
 
 /* Verifies a record. */
 morph_status morph_check_record(const morph_record *record, const morph_control *control,
@@ -49,7 +55,8 @@ morph_status morph_check_record(const morph_record *record, const morph_control 
 
 /* The same for lengths alone against the record's structure and limits (check --schedule): length, rate,
  * acceleration and jerk from the samples by finite differences, and compatibility with the record's own
- * schedule (joints) where sizes agree. time: samples; length: samples x links. */
+ * schedule: its joints at its samples, its curves of length between them, its end after it. time: samples;
+ * length: samples x links. */
 morph_status morph_check_lengths(const morph_record *record, const double *time, const double *length,
                                  int samples, morph_check_report *out);
 

@@ -41,10 +41,10 @@ static double row(const double w[5], const double c[5]) {
     return w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3] + w[4] * c[4];
 }
 
-void morph_check_curve_lengths(const morph_record *r, int k, int i, double *length) {
+void morph_check_curve_lengths(const morph_record *r, int k, double u, double *length) {
     const double h = morph_check_step(r->time, r->samples);
     double w[4][5], c[5], start;
-    weights((double)i / MORPH_CHECK_FINE, w);
+    weights(u, w);
     for (int link = 0; link < r->links; link++) {
         data_of(r, link, k, h, &start, c);
         length[link] = start + row(w[0], c);

@@ -11,6 +11,7 @@
 #include "planner/check_parts.h"
 
 #include <float.h>
+#include <stdlib.h>
 
 typedef struct table {
     const morph_record *r;
@@ -102,23 +103,61 @@ static void test_rest(const table *t, morph_findings *f) {
         }
 }
 
-/* The record's own joints at the same times, where both tables have the same samples. */
-static void test_compatibility(const table *t, morph_findings *f) {
+/* Lengths of the record at time t (links): from its joints at a sample, along its curves between samples, at
+ * rest before and after. Times within `near` of a sample are that sample. */
+static void record_lengths(const morph_record *r, double t, double near, double *length) {
+    const double h = morph_check_step(r->time, r->samples);
+    const int last = r->samples - 1;
+    int k = t <= 0 ? 0 : t / h >= last ? last : (int)(t / h);
+    double u = fmin(fmax(t / h - k, 0), 1);
+    if (u * h <= near) u = 0;
+    if (k < last && (1 - u) * h <= near) {
+        k++;
+        u = 0;
+    }
+    if (k < last && u > 0) {
+        morph_check_curve_lengths(r, k, u, length);
+        return;
+    }
+    const double *x = r->schedule_joints + 3 * (size_t)k * (size_t)r->joints;
+    for (int i = 0; i < r->links; i++)
+        length[i] = morph_dist(x + 3 * (size_t)r->link[i][0], x + 3 * (size_t)r->link[i][1]);
+}
+
+static void compare_row(const table *t, int k, const double *own, morph_finding *m) {
+    for (int link = 0; link < t->r->links; link++)
+        morph_finding_note(m, -fabs(at(t, k, link) - own[link]), t->h * k,
+                           morph_element_of(MORPH_ELEMENT_LINK, link), morph_no_element());
+}
+
+/* Every row against the record at the row's time, whatever the table's own step; and its last row against the
+ * record's end, or a table that never moves would do. Between samples the curves are the plan's to far below
+ * the tolerance. `near` is what times are known to: that much, at the fastest, is allowed for. */
+static morph_status test_compatibility(const table *t, double near, morph_findings *f) {
     const morph_record *r = t->r;
     morph_findings own = *f;
     own.defect[0] = 0;
-    if (r->samples != t->samples || !morph_check_schedule(r, &own)) return;
-    if (fabs(morph_check_step(r->time, r->samples) - t->h) > 1e-6 * t->h) return;
+    if (!morph_check_schedule(r, &own)) return MORPH_OK;
+    double *length = morph_alloc((size_t)r->links, sizeof(double)), fastest = 0;
+    if (!length) return MORPH_ERR_NOMEM;
+    for (size_t i = 0; i < (size_t)r->samples * (size_t)r->links; i++)
+        fastest = fmax(fastest, fabs(r->rate[i]));
     morph_finding *m = &f->kind[MORPH_MARGIN_COMPATIBILITY];
-    morph_finding_begin(m, 1e-6 * r->spacing + t->rounding, r->spacing);
-    for (int k = 0; k < t->samples; k++)
-        for (int link = 0; link < r->links; link++) {
-            const double *x = r->schedule_joints + 3 * (size_t)k * (size_t)r->joints;
-            const double size =
-                morph_dist(x + 3 * (size_t)r->link[link][0], x + 3 * (size_t)r->link[link][1]);
-            morph_finding_note(m, -fabs(at(t, k, link) - size), t->h * k,
-                               morph_element_of(MORPH_ELEMENT_LINK, link), morph_no_element());
-        }
+    morph_finding_begin(m, 1e-6 * r->spacing + t->rounding + near * fastest, r->spacing);
+    for (int k = 0; k < t->samples; k++) {
+        record_lengths(r, t->h * k, near, length);
+        compare_row(t, k, length, m);
+    }
+    record_lengths(r, r->time[r->samples - 1], near, length);
+    compare_row(t, t->samples - 1, length, m);
+    free(length);
+    return MORPH_OK;
+}
+
+/* Times written with nine digits are off by up to 5e-9 of the last; never more than a hundredth of a step. */
+static double time_rounding(const double *time, int samples) {
+    const double h = morph_check_step(time, samples);
+    return fmin(1e-8 * fabs(time[samples - 1]) + 1e-6 * h, 1e-2 * h);
 }
 
 static bool usable_table(const morph_record *r, const double *time, const double *length, int samples,
@@ -141,22 +180,18 @@ static bool usable_table(const morph_record *r, const double *time, const double
             return false;
         }
     }
-    /* Times written with nine digits are off by up to 5e-9 of the last; never more than a hundredth of a
-     * step. */
-    const double h = morph_check_step(time, samples);
-    const double tolerance = 1e-8 * fabs(time[samples - 1]) + 1e-6 * h;
-    if (!(h >= 1e-30)) {
+    if (!(morph_check_step(time, samples) >= 1e-30)) {
         morph_findings_defect(f, "time does not increase");
         return false;
     }
-    const int bad = morph_check_even(time, samples, fmin(tolerance, 1e-2 * h));
+    const int bad = morph_check_even(time, samples, time_rounding(time, samples));
     if (bad >= 0) morph_findings_defect(f, "time is not even from 0: sample %d is at %.9g s", bad, time[bad]);
     return bad < 0;
 }
 
-void morph_check_table(const morph_record *r, const double *time, const double *length, int samples,
-                       morph_findings *f) {
-    if (!usable_table(r, time, length, samples, f)) return;
+morph_status morph_check_table(const morph_record *r, const double *time, const double *length, int samples,
+                               morph_findings *f) {
+    if (!usable_table(r, time, length, samples, f)) return MORPH_OK;
     const table t = {r, length, samples, morph_check_step(time, samples),
                      rounding_of(length, (size_t)samples * (size_t)r->links)};
     test_lengths(&t, &f->kind[MORPH_MARGIN_LENGTH]);
@@ -164,5 +199,5 @@ void morph_check_table(const morph_record *r, const double *time, const double *
     test_order(&t, 2, r->acceleration_limit, &f->kind[MORPH_MARGIN_ACCELERATION]);
     test_order(&t, 3, r->jerk_limit, &f->kind[MORPH_MARGIN_JERK]);
     test_rest(&t, f);
-    test_compatibility(&t, f);
+    return test_compatibility(&t, time_rounding(time, samples), f);
 }

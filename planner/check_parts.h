@@ -32,6 +32,7 @@ typedef struct morph_finding {
 typedef struct morph_findings {
     morph_finding kind[MORPH_MARGIN_KINDS];
     double clearance_resolution; /* s */
+    double interpolation;        /* m */
     char defect[256];            /* the first one found */
 } morph_findings;
 
@@ -77,19 +78,20 @@ int morph_check_even(const double *time, int samples, double tolerance);
 
 /* Length, rate, acceleration and jerk between samples (quintic Hermite), rest and consistency. */
 void morph_check_curves(const morph_record *r, morph_findings *f);
-/* Lengths (links) of the curves at fine step i (0 .. MORPH_CHECK_FINE) of sample interval k. */
-void morph_check_curve_lengths(const morph_record *r, int k, int i, double *length);
+/* Lengths (links) of the curves at u (0 .. 1) of sample interval k. */
+void morph_check_curve_lengths(const morph_record *r, int k, double u, double *length);
 
-/* Posts, panels, angles, base, compatibility on the fine grid; held posts. */
+/* Panels, angles and base on the fine grid; posts and compatibility at the samples; held posts. */
 morph_status morph_check_poses(const morph_record *r, const morph_control *control, morph_findings *f);
 /* Swept distance to the target. */
 morph_status morph_check_clearance(const morph_record *r, const morph_control *control, morph_findings *f);
 /* Swept distances of links and posts among themselves. */
 morph_status morph_check_self(const morph_record *r, const morph_control *control, morph_findings *f);
 
-/* A table of lengths alone (samples x links): differences against the limits, and the record's joints. */
-void morph_check_table(const morph_record *r, const double *time, const double *length, int samples,
-                       morph_findings *f);
+/* A table of lengths alone (samples x links): differences against the limits, and the record's joints.
+ * MORPH_ERR_NOMEM. */
+morph_status morph_check_table(const morph_record *r, const double *time, const double *length, int samples,
+                               morph_findings *f);
 
 /* Points moving along piecewise cubics through their samples. */
 typedef struct morph_motion {

@@ -1,5 +1,8 @@
-/* What holds pose by pose, on the grid 10 times finer than the samples: posts, panels, angles, base plane,
- * and that lengths and joints tell the same story. */
+/* What holds pose by pose: panels, angles and base plane on the grid 10 times finer than the samples; at the
+ * samples posts, and that lengths and joints tell the same story. Between samples lengths alone are output,
+ * and joints follow a cubic through the nearest four: what posts and links are off there is the error of that
+ * cubic (of fourth order in the sample time, of third where the jerk jumps), not of the plan. It is measured,
+ * so that a finding that it may have made can be told from one of the plan. */
 #include "planner/check_parts.h"
 
 #include <stdlib.h>
@@ -143,7 +146,7 @@ static void test_panels(poses *p, double t) {
     }
 }
 
-static void test_rest_of_pose(poses *p, int k, int i, double t) {
+static void test_sample(poses *p, double t) {
     const morph_record *r = p->r;
     morph_finding *m = p->f->kind;
     const morph_element none = morph_no_element();
@@ -152,12 +155,27 @@ static void test_rest_of_pose(poses *p, int k, int i, double t) {
         morph_finding_note(&m[MORPH_MARGIN_POST_LENGTH], -error, t, morph_element_of(MORPH_ELEMENT_POST, j),
                            none);
     }
-    morph_check_curve_lengths(r, k, i, p->curve);
     for (int j = 0; j < r->links; j++) {
         const double error = fabs(p->curve[j] - p->size[j]);
         morph_finding_note(&m[MORPH_MARGIN_COMPATIBILITY], -error, t, morph_element_of(MORPH_ELEMENT_LINK, j),
                            none);
     }
+}
+
+static void measure_between(poses *p) {
+    const morph_record *r = p->r;
+    double most = p->f->interpolation;
+    for (int j = 0; j < r->posts; j++)
+        most = fmax(most, fabs(p->size[r->links + j] - r->post_length[j]));
+    for (int j = 0; j < r->links; j++)
+        most = fmax(most, fabs(p->curve[j] - p->size[j]));
+    p->f->interpolation = most;
+}
+
+static void test_base(poses *p, double t) {
+    const morph_record *r = p->r;
+    morph_finding *m = p->f->kind;
+    const morph_element none = morph_no_element();
     if (isnan(r->base)) return;
     for (int j = 0; j < r->joints; j++)
         morph_finding_note(&m[MORPH_MARGIN_BASE], p->x[3 * (size_t)j + 2] - r->base, t,
@@ -189,7 +207,12 @@ static void test_pose(poses *p, int k, int i) {
     place(p, tau);
     test_angles(p, t);
     test_panels(p, t);
-    test_rest_of_pose(p, k, i, t);
+    test_base(p, t);
+    morph_check_curve_lengths(p->r, k, (double)i / MORPH_CHECK_FINE, p->curve);
+    if (i == 0 || i == MORPH_CHECK_FINE)
+        test_sample(p, t);
+    else
+        measure_between(p);
 }
 
 morph_status morph_check_poses(const morph_record *r, const morph_control *control, morph_findings *f) {

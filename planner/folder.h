@@ -22,7 +22,15 @@ morph_status morph_folder_write(const char *folder, bool overwrite, const morph_
 /* Reads plan.h5 (path of a folder). MORPH_ERR_INPUT / MORPH_ERR_IO with message. */
 morph_status morph_folder_read(const char *folder, morph_record *record, char *message, size_t size);
 
-/* schedule.csv: allocates time (samples) and length (samples x links). Faults as "FILE:LINE: ...". */
+/* Are schedule.csv and schedule.json beside plan.h5 the ones written with it? Both checksums, every number of
+ * schedule.csv against the record, and what schedule.json says of samples and links. *findings: NULL if all
+ * is as it was, else one line for each thing that is not, free(). MORPH_ERR_INPUT where a file is missing,
+ * MORPH_ERR_IO, MORPH_ERR_NOMEM, with message. A record without a schedule has no such files: MORPH_OK. */
+morph_status morph_folder_verify(const char *folder, const morph_record *record, char **findings,
+                                 char *message, size_t size);
+
+/* schedule.csv: allocates time (samples) and length (samples x links). Faults as "FILE:LINE: ..."; a missing
+ * file is MORPH_ERR_INPUT too. */
 morph_status morph_schedule_read(const char *file, int links, double **time, double **length, int *samples,
                                  char *message, size_t size);
 

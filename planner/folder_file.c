@@ -10,6 +10,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+morph_status morph_name_fault(void) {
+    return errno == ENOENT || errno == ENOTDIR || errno == ENAMETOOLONG ? MORPH_ERR_INPUT : MORPH_ERR_IO;
+}
+
 static int write_all(int fd, const char *data, size_t size) {
     while (size > 0) {
         /* Some systems refuse more than 2 GiB at once. */
@@ -68,6 +72,7 @@ morph_status morph_file_replace(const char *file, const void *data, size_t size,
     morph_status status = morph_file_put(beside, data, size, message, message_size);
     if (status != MORPH_OK) {
         /* The reader knows the file that was asked for, not the one beside it. */
+        if (status == MORPH_ERR_IO) status = morph_name_fault();
         morph_fail(status, message, message_size, "%s: cannot be written: %s", file, strerror(errno));
     } else if (rename(beside, file) != 0) {
         int failed = errno;

@@ -106,7 +106,7 @@ static morph_status locate(const char *folder, morph_place *place, char *message
             return morph_fail(errno == ENOMEM ? MORPH_ERR_NOMEM : MORPH_ERR_IO, message, size,
                               "%s: cannot be used as plan folder: %s", folder, strerror(errno));
     } else if (errno != ENOENT) {
-        return morph_fail(MORPH_ERR_IO, message, size, "%s: cannot be used as plan folder: %s", folder,
+        return morph_fail(morph_name_fault(), message, size, "%s: cannot be used as plan folder: %s", folder,
                           strerror(errno));
     } else {
         place->folder = strdup(folder);
@@ -116,10 +116,10 @@ static morph_status locate(const char *folder, morph_place *place, char *message
     if (!*place->name || strcmp(place->name, ".") == 0 || strcmp(place->name, "..") == 0)
         return morph_fail(MORPH_ERR_INPUT, message, size, "\"%s\": is no name for a plan folder", folder);
     if (stat(place->parent, &info) != 0)
-        return morph_fail(MORPH_ERR_IO, message, size, "%s: the folder for it, %s: %s", folder, place->parent,
-                          strerror(errno));
+        return morph_fail(morph_name_fault(), message, size, "%s: the folder for it, %s: %s", folder,
+                          place->parent, strerror(errno));
     if (!S_ISDIR(info.st_mode))
-        return morph_fail(MORPH_ERR_IO, message, size, "%s: %s is not a folder", folder, place->parent);
+        return morph_fail(MORPH_ERR_INPUT, message, size, "%s: %s is not a folder", folder, place->parent);
     return MORPH_OK;
 }
 
@@ -142,7 +142,8 @@ static morph_status may_replace(const morph_place *place, const char *folder, bo
                                 size_t size) {
     if (!overwrite)
         return morph_fail(MORPH_ERR_INPUT, message, size,
-                          "%s: is there already: name another folder, or allow it to be overwritten", folder);
+                          "%s: is there already: name another folder, or exchange it with --overwrite",
+                          folder);
     char *plan = morph_path_join(place->folder, "plan.h5");
     if (!plan) return morph_fail(MORPH_ERR_NOMEM, message, size, "%s: out of memory", folder);
     bool known = morph_record_is_plan(plan);

@@ -46,11 +46,16 @@ void morph_text_html(morph_text *text, const char *plain);
 /* As a JSON string, quotes included; bytes that are no UTF-8 become U+FFFD. */
 void morph_text_json(morph_text *text, const char *plain);
 
+/* Of a file or folder that could not be opened: MORPH_ERR_INPUT where errno says that the name is at fault
+ * (it or a folder on its way is not there), else MORPH_ERR_IO. */
+morph_status morph_name_fault(void);
+
 /* Creates `file` (must not exist), writes, syncs and closes it. On failure the file is removed and the
  * message says what failed; MORPH_ERR_IO with errno kept. */
 morph_status morph_file_put(const char *file, const void *data, size_t size, char *message,
                             size_t message_size);
-/* The same into a hidden file beside, which then takes the place of `file` (a regular file or none). */
+/* The same into a hidden file beside, which then takes the place of `file` (a regular file or none).
+ * MORPH_ERR_INPUT where the folder for it is not there. */
 morph_status morph_file_replace(const char *file, const void *data, size_t size, char *message,
                                 size_t message_size);
 /* Whole file into memory, a 0 after it; free(*data). MORPH_ERR_IO, MORPH_ERR_INPUT when it is no regular

@@ -31,7 +31,8 @@ typedef struct morph_job {
     const char *folder; /* plan folder; NULL: the scene's path without ending, + ".plan" */
     const char *method; /* "ipopt" (default) or "blanket" */
     const char *motion; /* picture: "schedule" (default), "blanket", "replay", "core" */
-    bool overwrite;     /* exchange an existing plan folder */
+    bool overwrite;     /* exchange an existing plan folder; a stopped plan never does: it goes into
+                           FOLDER.stopped */
     void (*message)(void *user, const char *line);                    /* faults and warnings, one line each */
     void (*log)(void *user, const char *line);                        /* what the solvers do, one line each */
     void (*progress)(void *user, const char *stage, double fraction); /* fraction of that stage */

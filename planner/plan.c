@@ -276,9 +276,9 @@ static morph_status stage_path(planner *p) {
 /* A path that breaks its limits can ask for hours: its record is sampled more coarsely rather than filling
  * the memory, and is not feasible. */
 static double sample_step(planner *p) {
-    const double most = 200000.0, samples = p->timing.duration / p->scene->sample;
+    const double most = MORPH_SCENE_SAMPLES, samples = p->timing.duration / p->scene->sample;
     morph_summary *s = &p->plan->summary;
-    if (samples <= most) return p->scene->sample;
+    if (samples < most + 0.5) return p->scene->sample; /* whole but for rounding */
     if (!s->reason[0])
         snprintf(s->reason, sizeof s->reason,
                  "schedule.sample: %.6g s would make %.0f samples of a schedule of %.6g s, at most %.0f are "
@@ -385,9 +385,9 @@ static morph_status stage_check(planner *p) {
         snprintf(s->reason, sizeof s->reason, "the schedule is unusable: %s", s->check.defect);
     else if (!s->check.feasible) {
         const morph_margin *m = &s->check.margin[s->check.worst];
-        snprintf(s->reason, sizeof s->reason, "%s: %s at %.3f s: beyond by %.3g %s",
+        snprintf(s->reason, sizeof s->reason, "%s: %s at %.3f s: beyond by %.3g %s%s",
                  morph_margin_name(s->check.worst), m->element, m->time, -m->worst,
-                 morph_margin_unit(s->check.worst));
+                 morph_margin_unit(s->check.worst), morph_check_hint(&s->check));
     }
     const morph_outcome outcome = p->stopped     ? MORPH_STOPPED
                                   : !s->feasible ? MORPH_INFEASIBLE

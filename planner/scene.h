@@ -40,6 +40,9 @@ typedef struct morph_target_def {
     double young, density; /* Pa, kg/m3; 0 where the target is rigid */
 } morph_target_def;
 
+/* Samples of a schedule at most: hours at a millisecond, and what a plan's file can reasonably hold. */
+enum { MORPH_SCENE_SAMPLES = 200000 };
+
 typedef enum morph_mode { MORPH_MODE_DROP, MORPH_MODE_RISE } morph_mode;
 
 typedef struct morph_motion_def {

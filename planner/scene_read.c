@@ -13,7 +13,7 @@
 const char *const morph_mode_names[2] = {"drop", "rise"};
 
 /* title goes into a summary with room for 127 bytes. */
-enum { TITLE_BYTES = 120, SAMPLES_MOST = 1000000 };
+enum { TITLE_BYTES = 120 };
 
 static const morph_range height_range = {0.0, MORPH_SCENE_LARGEST, false, "m"};
 static const morph_range gravity_range = {0.0, MORPH_SCENE_LARGEST, false, "m/s2"};
@@ -108,10 +108,15 @@ static void read_schedule(morph_scene_reader *r, const morph_value *root) {
     char seconds[MORPH_NUMBER_TEXT], step[MORPH_NUMBER_TEXT];
     morph_number_print(scene->duration, seconds);
     morph_number_print(scene->sample, step);
-    if (samples > SAMPLES_MOST)
-        morph_value_fault(&duration, "%s s at a sample of %s s is too many samples, allowed: at most %d",
-                          seconds, step, SAMPLES_MOST);
-    else if (fabs(samples - round(samples)) > 1e-12 * samples + 1e-12 || samples < 0.5)
+    if (samples >= MORPH_SCENE_SAMPLES + 0.5) {
+        char longest[MORPH_NUMBER_TEXT], coarser[MORPH_NUMBER_TEXT];
+        morph_number_print(scene->sample * MORPH_SCENE_SAMPLES, longest);
+        morph_number_print(scene->duration / MORPH_SCENE_SAMPLES, coarser);
+        morph_value_fault(&duration,
+                          "%s s at a schedule.sample of %s s is too many samples, allowed: at most %d, so a "
+                          "duration of at most %s s or a schedule.sample of at least %s s",
+                          seconds, step, MORPH_SCENE_SAMPLES, longest, coarser);
+    } else if (fabs(samples - round(samples)) > 1e-12 * samples + 1e-12 || samples < 0.5)
         morph_value_fault(&duration, "%s is no whole number of samples, allowed: a multiple of %s s, or auto",
                           seconds, step);
 }

@@ -23,7 +23,8 @@ static const morph_range acceleration_range = {0.0, MORPH_SCENE_LARGEST, true, "
 static const morph_range jerk_range = {0.0, MORPH_SCENE_LARGEST, true, "m/s3"};
 static const morph_range stiffness_range = {0.0, MORPH_SCENE_LARGEST, true, "N/m"};
 static const morph_range damping_range = {0.0, MORPH_SCENE_LARGEST, false, "N s/m"};
-static const morph_range angle_range = {0.0, 180.0, false, "degrees"};
+/* At 0 and at 180 degrees two members lie in one line: no limit, but an end of all angles. */
+static const morph_range angle_range = {0.0, 180.0, 2, "degrees"};
 static const morph_range force_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "N"};
 
 static morph_found read_number(const morph_value *map, const char *key, const morph_range *range,
@@ -206,17 +207,25 @@ static void read_link(morph_scene_reader *r, const morph_value *structure) {
     check_room(r, structure, &link);
 }
 
+/* What is wrong with a pair of angle limits, and what is allowed; NULL if nothing is. */
+static const char *angle_fault(const double degrees[2]) {
+    if (degrees[0] == degrees[1]) return "is empty, allowed: the larger must be above the smaller";
+    if (degrees[0] > 90.0 || degrees[1] < 90.0)
+        return "leaves out 90, the angle at the start, allowed: a range that holds 90";
+    return NULL;
+}
+
 /* Limits in degrees to radians; the flat start has 90 degrees everywhere. */
 static void read_angle(const morph_value *angle, const char *key, double out[2]) {
     const morph_value value = morph_value_get(angle, key);
     double degrees[2];
     if (morph_value_pair(&value, &angle_range, degrees) != MORPH_FOUND) return;
-    if (degrees[0] > 90.0 || degrees[1] < 90.0) {
+    const char *wrong = angle_fault(degrees);
+    if (wrong) {
         char lo[MORPH_NUMBER_TEXT], hi[MORPH_NUMBER_TEXT];
         morph_number_print(degrees[0], lo);
         morph_number_print(degrees[1], hi);
-        morph_value_fault(
-            &value, "[%s, %s] leaves out 90, the angle at the start, allowed: a range that holds 90", lo, hi);
+        morph_value_fault(&value, "[%s, %s] %s", lo, hi, wrong);
         return;
     }
     for (int k = 0; k < 2; k++)

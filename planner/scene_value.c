@@ -108,8 +108,8 @@ static void describe_range(const morph_range *range, char *text) {
     char lo[MORPH_NUMBER_TEXT], hi[MORPH_NUMBER_TEXT];
     morph_number_print(range->lo, lo);
     morph_number_print(range->hi, hi);
-    snprintf(text, ALLOWED, "a number %s %s and at most %s%s%s", range->above ? "above" : "of at least", lo,
-             hi, range->unit[0] ? " " : "", range->unit);
+    snprintf(text, ALLOWED, "a number %s %s and %s %s%s%s", range->above ? "above" : "of at least", lo,
+             range->above > 1 ? "below" : "at most", hi, range->unit[0] ? " " : "", range->unit);
 }
 
 /* What is wrong with a value that should be a number; NULL if nothing is. */
@@ -134,7 +134,7 @@ morph_found morph_value_number(const morph_value *value, const morph_range *rang
     if (!wrong && range->above && x <= range->lo)
         wrong = x < 0.0 && range->lo == 0.0 ? "is negative" : "is too small";
     if (!wrong && x < range->lo) wrong = range->lo == 0.0 ? "is negative" : "is too small";
-    if (!wrong && x > range->hi) wrong = "is too large";
+    if (!wrong && (x > range->hi || (range->above > 1 && x >= range->hi))) wrong = "is too large";
     if (!wrong) {
         *out = x;
         return MORPH_FOUND;
@@ -223,12 +223,11 @@ morph_found morph_value_pair(const morph_value *value, const morph_range *range,
     double x[2];
     const morph_found found = morph_value_numbers(value, range, 2, x);
     if (found != MORPH_FOUND) return found;
-    if (x[0] >= x[1]) {
+    if (x[0] > x[1]) {
         char lo[MORPH_NUMBER_TEXT], hi[MORPH_NUMBER_TEXT];
         morph_number_print(x[0], lo);
         morph_number_print(x[1], hi);
-        morph_value_fault(value, "[%s, %s] is %s, allowed: the smaller number first", lo, hi,
-                          x[0] > x[1] ? "inverted" : "empty");
+        morph_value_fault(value, "[%s, %s] is inverted, allowed: the smaller number first", lo, hi);
         return MORPH_FAULTY;
     }
     memcpy(out, x, sizeof x);

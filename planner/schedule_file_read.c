@@ -161,6 +161,7 @@ morph_status morph_schedule_read(const char *file, int links, double **time, dou
     char *text;
     size_t total;
     morph_status status = morph_file_load(file, &text, &total, message, size);
+    if (status == MORPH_ERR_IO) status = morph_name_fault();
     if (status != MORPH_OK) return status;
     morph_locale locale;
     if (!morph_locale_enter(&locale)) {

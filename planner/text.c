@@ -62,7 +62,7 @@ static void margin_line(FILE *out, morph_margin_kind kind, const morph_margin *m
             without_sign_of_zero(m->worst), morph_margin_unit(kind), -m->tolerance, m->time, m->element);
 }
 
-char *morph_check_text(const morph_check_report *r) {
+char *morph_check_text(const morph_check_report *r, bool whole, const char *files) {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
@@ -75,8 +75,14 @@ char *morph_check_text(const morph_check_report *r) {
                     lengths_only ? "not tested: a schedule file holds lengths only" : "not in this plan");
     if (!lengths_only && r->clearance_at_end)
         fprintf(out, "clearance is to the pressed target at the end: a deformable one gives way before\n");
+    if (files)
+        fputs(files, out);
+    else if (whole)
+        fprintf(out, "%-15s holds schedule.csv and schedule.json are those of plan.h5\n", "files");
     if (!r->feasible)
-        fprintf(out, "not every limit holds\n");
+        fprintf(out, "not every limit holds%s\n", morph_check_hint(r));
+    else if (files)
+        fprintf(out, "every limit holds in plan.h5, but the folder is not as it was written\n");
     else
         fprintf(out, "every limit%s holds (margins: positive is inside)\n",
                 lengths_only ? " on lengths" : "");

@@ -53,10 +53,10 @@ typedef struct morph_value {
 /* What came of asking for a value: MORPH_FAULTY has left a fault line, and the output as it was. */
 typedef enum morph_found { MORPH_ABSENT, MORPH_FOUND, MORPH_FAULTY } morph_found;
 
-/* lo..hi, without lo itself where `above`; unit for messages, may be "". */
+/* lo..hi; unit for messages, may be "". */
 typedef struct morph_range {
     double lo, hi;
-    bool above;
+    int above; /* 0: with both ends, 1: without lo, 2: without either */
     const char *unit;
 } morph_range;
 
@@ -114,7 +114,7 @@ morph_found morph_value_integer(const morph_value *value, long lo, long hi, long
 /* A list of exactly n numbers (whole numbers). */
 morph_found morph_value_numbers(const morph_value *value, const morph_range *range, int n, double *out);
 morph_found morph_value_integers(const morph_value *value, const long *lo, const long *hi, int n, long *out);
-/* A list of two numbers, the first below the second. */
+/* A list of two numbers, the first not above the second. */
 morph_found morph_value_pair(const morph_value *value, const morph_range *range, double out[2]);
 /* One of count names; *out is its index. */
 morph_found morph_value_choice(const morph_value *value, const char *const *names, int count, int *out);

@@ -14,7 +14,8 @@ static const char usage_text[] =
     "\n"
     "  plan SCENE [-o DIR]                plan a morph and write the plan folder (default: SCENE without "
     "ending + .plan)\n"
-    "  check DIR [--schedule FILE]        verify a plan folder, or a schedule file against its plan\n"
+    "  check DIR [--schedule FILE]        verify a plan folder and its files, or a schedule file against its "
+    "plan\n"
     "  picture DIR -o FILE.svg|png        still pictures: four moments, lengths over time\n"
     "          [--of MOTION]              of the schedule (default), the blanket, the replay of its "
     "lengths,\n"
@@ -23,11 +24,15 @@ static const char usage_text[] =
     "\n"
     "options of plan:\n"
     "  --method ipopt|blanket             refined plan (default), or the pure blanket as it fell\n"
-    "  --overwrite                        exchange an existing plan folder\n"
+    "  --overwrite                        exchange an existing plan folder (interrupted: that stays, the "
+    "best "
+    "so far\n"
+    "                                     goes into DIR.stopped)\n"
     "  --json                             print the summary as JSON instead of six lines\n"
+    "\n"
+    "options of all:\n"
     "  --quiet                            no progress\n"
     "  --verbose                          what the solvers do, on stderr\n"
-    "\n"
     "  --help, --version\n"
     "\n"
     "exit codes: 0 done, every check holds; 1 internal error or machine refused; 2 wrong usage or input;\n"
@@ -207,20 +212,58 @@ static int take_option(int option, const char *value, arguments *a) {
     }
 }
 
-static int read_arguments(int argc, char **argv, arguments *a) {
-    static const struct option options[] = {{"method", required_argument, NULL, O_METHOD},
-                                            {"level", required_argument, NULL, O_LEVEL},
-                                            {"budget", required_argument, NULL, O_BUDGET},
-                                            {"overwrite", no_argument, NULL, O_OVERWRITE},
-                                            {"json", no_argument, NULL, O_JSON},
-                                            {"quiet", no_argument, NULL, O_QUIET},
-                                            {"verbose", no_argument, NULL, O_VERBOSE},
-                                            {"threads", required_argument, NULL, O_THREADS},
-                                            {"schedule", required_argument, NULL, O_SCHEDULE},
-                                            {"of", required_argument, NULL, O_OF},
-                                            {"help", no_argument, NULL, O_HELP},
-                                            {"version", no_argument, NULL, O_VERSION},
-                                            {NULL, 0, NULL, 0}};
+/* Who takes an option. */
+enum { PLAN = 1, CHECK = 2, PICTURE = 4, INFO = 8, ALL = 15 };
+
+static const struct option options[] = {{"method", required_argument, NULL, O_METHOD},
+                                        {"level", required_argument, NULL, O_LEVEL},
+                                        {"budget", required_argument, NULL, O_BUDGET},
+                                        {"overwrite", no_argument, NULL, O_OVERWRITE},
+                                        {"json", no_argument, NULL, O_JSON},
+                                        {"quiet", no_argument, NULL, O_QUIET},
+                                        {"verbose", no_argument, NULL, O_VERBOSE},
+                                        {"threads", required_argument, NULL, O_THREADS},
+                                        {"schedule", required_argument, NULL, O_SCHEDULE},
+                                        {"of", required_argument, NULL, O_OF},
+                                        {"help", no_argument, NULL, O_HELP},
+                                        {"version", no_argument, NULL, O_VERSION},
+                                        {NULL, 0, NULL, 0}};
+
+static int takers(int option) {
+    switch (option) {
+    case 'o':
+        return PLAN | PICTURE;
+    case O_SCHEDULE:
+        return CHECK;
+    case O_OF:
+        return PICTURE;
+    case O_QUIET:
+    case O_VERBOSE:
+    case O_HELP:
+    case O_VERSION:
+        return ALL;
+    default:
+        return PLAN;
+    }
+}
+
+/* An option of another command would be left out silently: refused, with those that there are. */
+static int foreign_option(int option, int command, const char *name) {
+    const char *is = "o";
+    char allowed[200], what[64];
+    size_t used = (size_t)snprintf(allowed, sizeof allowed, "%s", takers('o') & command ? "-o, " : "");
+    for (const struct option *o = options; o->name; o++) {
+        if (o->val == option) is = o->name;
+        if (takers(o->val) & command)
+            used += (size_t)snprintf(allowed + used, sizeof allowed - used, "--%s, ", o->name);
+    }
+    allowed[used - 2] = '\0'; /* the last comma; --help is always there */
+    snprintf(what, sizeof what, "%s%s is no option of %s", option == 'o' ? "-" : "--", is, name);
+    return usage_fault(what, "", allowed);
+}
+
+/* command: one of the above, 0 before there is one; name: as it is called. */
+static int read_arguments(int argc, char **argv, int command, const char *name, arguments *a) {
     int option;
     opterr = 0; /* getopt's own lines would make two of one fault */
     while ((option = getopt_long(argc, argv, "o:", options, NULL)) != -1) {
@@ -230,6 +273,7 @@ static int read_arguments(int argc, char **argv, arguments *a) {
                     argv[optind - 1]);
             return MORPH_EXIT_INPUT;
         }
+        if (command && !(takers(option) & command)) return foreign_option(option, command, name);
         const int code = take_option(option, optarg, a);
         if (code != 0) return code;
     }
@@ -301,21 +345,23 @@ int main(int argc, char **argv) {
     static const struct {
         const char *name;
         int (*run)(const arguments *);
-    } commands[] = {{"plan", run_plan}, {"check", run_check}, {"picture", run_picture}, {"info", run_info},
-                    {"compare", NULL},  {"export", NULL},     {"trade", NULL}};
+        int takes;
+    } commands[] = {{"plan", run_plan, PLAN}, {"check", run_check, CHECK}, {"picture", run_picture, PICTURE},
+                    {"info", run_info, INFO}, {"compare", NULL, 0},        {"export", NULL, 0},
+                    {"trade", NULL, 0}};
     arguments a = {0};
     if (argc < 2) {
         fputs(usage_text, stderr);
         return MORPH_EXIT_INPUT;
     }
     if (argv[1][0] == '-') {
-        const int code = read_arguments(argc, argv, &a);
+        const int code = read_arguments(argc, argv, 0, "", &a);
         return code ? code : usage_fault("no command", "", "plan, check, picture, info");
     }
     for (size_t k = 0; k < sizeof commands / sizeof *commands; k++) {
         if (strcmp(argv[1], commands[k].name) != 0) continue;
         if (!commands[k].run) return not_yet(commands[k].name);
-        const int code = read_arguments(argc - 1, argv + 1, &a);
+        const int code = read_arguments(argc - 1, argv + 1, commands[k].takes, commands[k].name, &a);
         if (code) return code;
         struct sigaction action = {.sa_handler = on_signal};
         sigaction(SIGINT, &action, NULL);

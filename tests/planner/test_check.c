@@ -127,6 +127,60 @@ static void bent_post(void **state) {
     morph_record_free(&r);
 }
 
+/* Eight samples of the whole motion: the cubic through joints is off by more than lengths may be at samples,
+ * which is no fault of the record. */
+static void coarse_samples(void **state) {
+    (void)state;
+    morph_record r;
+    fixture_record(&r, 3, 8, 4);
+    morph_check_report c = fixture_check(&r);
+    assert_string_equal(c.defect, "");
+    assert_true(c.feasible);
+    assert_true(c.interpolation > 1e-6 && c.interpolation < 1e-3);
+    assert_false(c.coarse);
+    assert_string_equal(morph_check_hint(&c), "");
+    /* The base plane touched at a sample: between samples the cubic goes through it, and the hint says why.
+     */
+    r.base = INFINITY;
+    for (int i = 0; i < r.samples * r.joints; i++)
+        r.base = fmin(r.base, r.schedule_joints[3 * i + 2]);
+    c = fixture_check(&r);
+    assert_false(c.feasible);
+    assert_int_equal(c.worst, MORPH_MARGIN_BASE);
+    assert_true(c.margin[MORPH_MARGIN_BASE].worst < -1e-6);
+    assert_true(c.coarse);
+    assert_non_null(strstr(morph_check_hint(&c), "schedule.sample"));
+    /* A millimetre is more than the interpolation can explain. */
+    r.base += 1e-3;
+    c = fixture_check(&r);
+    assert_int_equal(c.worst, MORPH_MARGIN_BASE);
+    assert_false(c.feasible || c.coarse);
+    morph_record_free(&r);
+    /* Fine samples: nothing is to be blamed on them. */
+    fixture_record(&r, 3, 401, 4);
+    r.base = INFINITY;
+    for (int i = 0; i < r.samples * r.joints; i++)
+        r.base = fmin(r.base, r.schedule_joints[3 * i + 2] + 2e-6);
+    c = fixture_check(&r);
+    assert_int_equal(c.worst, MORPH_MARGIN_BASE);
+    assert_false(c.feasible || c.coarse);
+    morph_record_free(&r);
+}
+
+/* A fault of the data is seen at coarse samples as well. */
+static void coarse_samples_hide_no_fault(void **state) {
+    (void)state;
+    morph_record r;
+    fixture_record(&r, 3, 8, 4);
+    const int k = 5, post = 4;
+    r.schedule_joints[3 * (k * r.joints + r.post[post][1]) + 2] += 2e-7;
+    const morph_check_report c = fixture_check(&r);
+    fixture_expect(&c, MORPH_MARGIN_POST_LENGTH, -4e-6, 1e-8, "post (1,1)", r.time[k] - 1e-9,
+                   r.time[k] + 1e-9);
+    assert_false(c.coarse);
+    morph_record_free(&r);
+}
+
 static void length_that_fits_no_shape(void **state) {
     (void)state;
     morph_record r;
@@ -309,6 +363,8 @@ int main(void) {
         cmocka_unit_test(acceleration_beyond_its_limit),
         cmocka_unit_test(jerk_spike),
         cmocka_unit_test(bent_post),
+        cmocka_unit_test(coarse_samples),
+        cmocka_unit_test(coarse_samples_hide_no_fault),
         cmocka_unit_test(length_that_fits_no_shape),
         cmocka_unit_test(angle_beyond_its_limit),
         cmocka_unit_test(base_dip),

@@ -125,7 +125,7 @@ static void lengths_of_another_shape(void **state) {
     char name[96];
     morph_record_link_name(&r, 9, name, sizeof name);
     fixture_expect(&c, MORPH_MARGIN_COMPATIBILITY, -2e-6, 1e-11, name, 0, 4);
-    /* Fewer samples cannot be compared with the record's joints. */
+    /* Every second sample. */
     double *fewer = malloc(201 * (size_t)r.links * sizeof(double)), time[201];
     for (int k = 0; k < 201; k++) {
         memcpy(fewer + k * r.links, r.length + 2 * k * r.links, (size_t)r.links * sizeof(double));
@@ -133,9 +133,52 @@ static void lengths_of_another_shape(void **state) {
     }
     assert_int_equal(morph_check_lengths(&r, time, fewer, 201, &c), MORPH_OK);
     assert_true(c.feasible);
-    assert_false(c.margin[MORPH_MARGIN_COMPATIBILITY].tested);
+    assert_true(c.margin[MORPH_MARGIN_COMPATIBILITY].tested);
+    assert_true(c.margin[MORPH_MARGIN_COMPATIBILITY].worst > -1e-12);
+    for (int k = 0; k < 201; k++)
+        fewer[k * r.links + 9] -= 2e-6;
+    assert_int_equal(morph_check_lengths(&r, time, fewer, 201, &c), MORPH_OK);
+    fixture_expect(&c, MORPH_MARGIN_COMPATIBILITY, -2e-6, 1e-11, name, 0, 4);
     free(fewer);
     free(length);
+    morph_record_free(&r);
+}
+
+/* The same motion at another rate is the record's, whatever the steps; at another pace it is not, nor is one
+ * that never moves or that stops early. */
+static void tables_of_another_rate(void **state) {
+    (void)state;
+    morph_record r, other;
+    fixture_record(&r, 3, 401, 4);
+    static const struct {
+        int samples;
+        double duration;
+        bool same;
+    } cases[] = {{321, 4, true}, {1238, 4, true}, {401, 5, false}, {501, 5, false}, {1201, 3.99, false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        fixture_record(&other, 3, cases[k].samples, cases[k].duration);
+        morph_check_report c;
+        assert_int_equal(morph_check_lengths(&r, other.time, other.length, other.samples, &c), MORPH_OK);
+        const morph_margin *m = &c.margin[MORPH_MARGIN_COMPATIBILITY];
+        assert_string_equal(c.defect, "");
+        assert_true(m->tested);
+        assert_int_equal(c.feasible, cases[k].same);
+        assert_int_equal(m->worst >= -m->tolerance, cases[k].same);
+        /* Between samples the quintic is the motion's to far below the tolerance. */
+        if (cases[k].same) assert_true(m->worst > -1e-9);
+        morph_record_free(&other);
+    }
+    double *still = malloc(5 * (size_t)r.links * sizeof(double)), time[5];
+    for (int k = 0; k < 5; k++) {
+        memcpy(still + k * r.links, r.length, (size_t)r.links * sizeof(double));
+        time[k] = 1e-4 * k;
+    }
+    morph_check_report c;
+    assert_int_equal(morph_check_lengths(&r, time, still, 5, &c), MORPH_OK);
+    assert_false(c.feasible);
+    assert_int_equal(c.worst, MORPH_MARGIN_COMPATIBILITY);
+    assert_true(fabs(c.margin[MORPH_MARGIN_COMPATIBILITY].time - 4e-4) < 1e-12);
+    free(still);
     morph_record_free(&r);
 }
 
@@ -176,6 +219,7 @@ int main(void) {
         cmocka_unit_test(rounded_tables_pass),      cmocka_unit_test(figures_are_those_of_the_motion),
         cmocka_unit_test(planted_faults_are_named), cmocka_unit_test(noise_is_not_a_fault),
         cmocka_unit_test(lengths_of_another_shape), cmocka_unit_test(unusable_tables),
+        cmocka_unit_test(tables_of_another_rate),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -123,7 +123,8 @@ static void csv_faults(void **state) {
     assert_non_null(strstr(message, ":2: holds a zero byte"));
     assert_int_equal(
         morph_schedule_read("/no/such.csv", 2, &time, &length, &samples, message, sizeof message),
-        MORPH_ERR_IO);
+        MORPH_ERR_INPUT);
+    assert_non_null(strstr(message, "No such file"));
     assert_int_equal(morph_schedule_read("/dev/null", 2, &time, &length, &samples, message, sizeof message),
                      MORPH_ERR_INPUT);
 }

@@ -147,6 +147,7 @@ static void overwriting(void **state) {
     assert_int_equal(write_plan(20, false), MORPH_OK);
     assert_int_equal(morph_folder_probe(folder, false, message, sizeof message), MORPH_ERR_INPUT);
     assert_non_null(strstr(message, "is there already"));
+    assert_non_null(strstr(message, "--overwrite"));
     assert_int_equal(write_plan(30, false), MORPH_ERR_INPUT);
     assert_int_equal(plan_samples(), 20);
     assert_int_equal(morph_folder_probe(folder, true, message, sizeof message), MORPH_OK);
@@ -406,12 +407,122 @@ static void reading_folders(void **state) {
     assert_int_equal(morph_folder_read("/dev/null", &r, message, sizeof message), MORPH_ERR_INPUT);
 }
 
+static void missing_parents(void **state) {
+    (void)state;
+    assert_int_equal(morph_folder_probe("/no/such/a.plan", false, message, sizeof message), MORPH_ERR_INPUT);
+    assert_non_null(strstr(message, "/no/such"));
+    assert_int_equal(morph_folder_probe("/dev/null/a.plan", false, message, sizeof message), MORPH_ERR_INPUT);
+    assert_non_null(strstr(message, "/dev/null"));
+}
+
+static void save(const char *name, const char *data, size_t size) {
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(data, 1, size, f), size);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* A file with `from` turned into `to`, of the same length, is found out by a line that starts with its name
+ * and says `what`. */
+static void expect_found(const morph_record *r, const char *name, const char *from, const char *to,
+                         const char *what) {
+    size_t n;
+    char *data = load(name, &n), *found = NULL, *at = strstr(data, from);
+    assert_non_null(at);
+    assert_int_equal(strlen(from), strlen(to));
+    memcpy(at, to, strlen(to));
+    save(name, data, n);
+    assert_int_equal(morph_folder_verify(folder, r, &found, message, sizeof message), MORPH_OK);
+    if (!found || !strstr(found, name) || !strstr(found, what))
+        fail_msg("%s: %s -> %s: %s", name, from, to, found ? found : "not found out");
+    free(found);
+    memcpy(at, from, strlen(from));
+    save(name, data, n);
+    free(data);
+    assert_int_equal(morph_folder_verify(folder, r, &found, message, sizeof message), MORPH_OK);
+    assert_null(found);
+}
+
+static void verifying(void **state) {
+    (void)state;
+    morph_record r;
+    assert_int_equal(write_plan(20, false), MORPH_OK);
+    assert_int_equal(morph_folder_read(folder, &r, message, sizeof message), MORPH_OK);
+    char *found, name[96], when[64];
+    assert_int_equal(morph_folder_verify(folder, &r, &found, message, sizeof message), MORPH_OK);
+    assert_null(found);
+    /* One digit of one length, in the eighth row: link and time. */
+    size_t n;
+    char *csv = load("schedule.csv", &n), number[128], wrong[128], *row = csv;
+    for (int k = 0; k < 8; k++)
+        row = strchr(row, '\n') + 1;
+    const size_t start = strcspn(row, ",");
+    snprintf(number, sizeof number, "%.*s", (int)(start + 1 + strcspn(row + start + 1, ",")), row);
+    memcpy(wrong, number, sizeof wrong);
+    char *digit = strrchr(wrong, '.') + 2;
+    *digit = *digit == '9' ? '1' : (char)(*digit + 1);
+    morph_record_link_name(&r, 0, name, sizeof name);
+    snprintf(when, sizeof when, "at %.9g s is", r.time[7]);
+    expect_found(&r, "schedule.csv", number, wrong, name);
+    expect_found(&r, "schedule.csv", number, wrong, when);
+    expect_found(&r, "schedule.csv", number, wrong, "checksum");
+    expect_found(&r, "schedule.csv", "time_s", "time_x", "time_x");
+    free(csv);
+    expect_found(&r, "schedule.json", "\"samples\": 20", "\"samples\": 21", "\"samples\"");
+    expect_found(&r, "schedule.json", "], \"rate\": ", "], \"raze\": ", "\"rate\" of link 0 ");
+    expect_found(&r, "schedule.json", "\"joints\": [0", "\"joints\": [9", "\"joints\" of link 0 ");
+    expect_found(&r, "schedule.json", "{", "[", "is no JSON");
+    expect_found(&r, "schedule.json", "\"schedule\": {", "\"schedula\": {", "holds no checksums");
+    expect_found(&r, "schedule.json", "\"links\"", "\"linkz\"", "list of links");
+    morph_record_free(&r);
+}
+
+/* Of two plans each file is sound, but not together; and nothing can be said of files that are not there. */
+static void verifying_mixed(void **state) {
+    (void)state;
+    morph_record r;
+    size_t n;
+    char *found;
+    assert_int_equal(write_plan(20, false), MORPH_OK);
+    char *json = load("schedule.json", &n);
+    assert_int_equal(write_plan(30, true), MORPH_OK);
+    save("schedule.json", json, n);
+    free(json);
+    assert_int_equal(morph_folder_read(folder, &r, message, sizeof message), MORPH_OK);
+    assert_int_equal(morph_folder_verify(folder, &r, &found, message, sizeof message), MORPH_OK);
+    assert_non_null(found);
+    assert_non_null(strstr(found, "plan.h5 "));
+    assert_non_null(strstr(found, "schedule.csv "));
+    free(found);
+    static const char *const files[] = {"schedule.csv", "schedule.json"};
+    for (int k = 0; k < 2; k++) {
+        char path[256];
+        assert_int_equal(write_plan(20, true), MORPH_OK);
+        snprintf(path, sizeof path, "%s/%s", folder, files[k]);
+        assert_int_equal(unlink(path), 0);
+        assert_int_equal(morph_folder_verify(folder, &r, &found, message, sizeof message), MORPH_ERR_INPUT);
+        assert_null(found);
+        assert_non_null(strstr(message, path));
+        assert_non_null(strstr(message, "is missing"));
+    }
+    /* Without a schedule there are none. */
+    const int samples = r.samples;
+    r.samples = 0;
+    assert_int_equal(morph_folder_verify(folder, &r, &found, message, sizeof message), MORPH_OK);
+    assert_null(found);
+    r.samples = samples;
+    morph_record_free(&r);
+}
+
 int main(void) {
 #define EACH(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
     const struct CMUnitTest tests[] = {
-        EACH(whole_folder), EACH(same_bytes),    EACH(overwriting),     EACH(never_replaced),
-        EACH(write_fails),  EACH(full_disk),     EACH(killed),          EACH(stale_folders),
-        EACH(swap),         EACH(target_copied), EACH(reading_folders),
+        EACH(whole_folder), EACH(same_bytes),      EACH(overwriting),     EACH(never_replaced),
+        EACH(write_fails),  EACH(full_disk),       EACH(killed),          EACH(stale_folders),
+        EACH(swap),         EACH(target_copied),   EACH(reading_folders), EACH(missing_parents),
+        EACH(verifying),    EACH(verifying_mixed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -147,7 +147,7 @@ static void refusals(void **state) {
     unlink(path);
     r.schedule_joints[5] = 0;
     assert_int_equal(morph_picture_write(&r, "", "/no/such/folder/a.png", message, sizeof message),
-                     MORPH_ERR_IO);
+                     MORPH_ERR_INPUT);
     assert_non_null(strstr(message, "No such file"));
     /* A folder in the file's place is left alone. */
     assert_int_equal(mkdir(path, 0777), 0);

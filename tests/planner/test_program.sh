@@ -29,10 +29,46 @@ expect 0 "$program" check "$plan"
 for margin in length rate acceleration jerk post_length link_post link_link clearance base self_clearance compatibility; do
     holds "$margin holds" grep -Eq "^$margin +holds " "$work/out"
 done
+holds "the files hold" grep -Eq '^files +holds ' "$work/out"
 expect 0 "$program" check "$plan" --schedule "$plan/schedule.csv"
 awk -F , -v OFS=, 'NR == 1000 { $9 = $9 + 0.05 } { print }' "$plan/schedule.csv" >"$work/bad.csv"
 expect 3 "$program" check "$plan" --schedule "$work/bad.csv"
 holds "the spoilt link is named" grep -q 'link 7 ' "$work/out"
+awk 'NR == 1 || NR % 2 == 0' "$plan/schedule.csv" >"$work/half.csv"
+expect 0 "$program" check "$plan" --schedule "$work/half.csv"
+holds "a table of half the rate is compared" grep -q '^compatibility   holds' "$work/out"
+awk -F , -v OFS=, 'NR > 1 { $1 = $1 * 1.5 } { print }' "$plan/schedule.csv" >"$work/slow.csv"
+expect 3 "$program" check "$plan" --schedule "$work/slow.csv"
+holds "a slower table is not the plan's" grep -q '^compatibility   FAILS' "$work/out"
+expect 2 "$program" check "$plan" --schedule "$work/missing.csv"
+says missing.csv
+
+# Check: every file of the folder that a machine reads.
+# altered FILE COMMAND...: check after COMMAND has been run in a copy of the plan.
+altered() {
+    rm -rf "$work/altered.plan"
+    cp -r "$plan" "$work/altered.plan"
+    file=$1
+    shift
+    (cd "$work/altered.plan" && "$@")
+    expect 3 "$program" check "$work/altered.plan" --quiet
+    holds "$file is named" grep -q "^$file  *FAILS" "$work/out"
+}
+altered schedule.csv cp "$work/bad.csv" schedule.csv
+holds "the spoilt link and its time are told" grep -q '^schedule.csv .*link 7 .* at 0.998 s is .* (off by 0.05 m)' "$work/out"
+altered schedule.csv sed -i '$ d' schedule.csv
+altered schedule.csv sed -i '50 s/0/x/' schedule.csv
+altered schedule.json sed -i 's/], "rate": 0.05/], "rate": 0.5/' schedule.json
+altered schedule.json sed -i '1 d' schedule.json
+altered plan.h5 sh -c 'echo >>plan.h5'
+for file in schedule.csv schedule.json plan.h5; do
+    cp "$plan"/* "$work/altered.plan"
+    rm "$work/altered.plan/$file"
+    expect 2 "$program" check "$work/altered.plan" --quiet
+    one_line
+    says "$file"
+done
+rm -r "$work/altered.plan"
 head -c 3000 "$plan/plan.h5" >"$work/short.h5"
 mkdir "$work/short.plan" && mv "$work/short.h5" "$work/short.plan/plan.h5"
 run "$program" check "$work/short.plan"
@@ -50,6 +86,8 @@ expect 2 "$program" picture "$plan" -o "$work/box.jpeg"
 says 'svg'
 expect 2 "$program" picture "$plan"
 one_line
+expect 2 "$program" picture "$plan" -o "$work/none/box.svg"
+says "$work/none/box.svg"
 absent "$work" box.jpeg
 
 expect 0 "$program" info "$scene"
@@ -62,7 +100,7 @@ holds "exit codes in the help" grep -q 'exit codes' "$work/out"
 fingerprint "$plan" >"$work/before"
 expect 2 "$program" plan "$scene" -o "$plan"
 one_line
-says 'is there already'
+says 'is there already: .*--overwrite'
 unchanged "$plan" "$work/before"
 mkdir "$work/photos" && echo mine >"$work/photos/holiday.txt"
 fingerprint "$work/photos" >"$work/before"
@@ -88,6 +126,45 @@ refused plan "$work/missing.yaml"
 says missing.yaml
 refused plan "$scene" --budget -5
 refused plan "$scene" --level best
+refused plan "$scene" -o "$work/none/box.plan"
+says "$work/none"
+refused plan "$scene" -o "$scene/box.plan"
+
+# An option of another command is not left out silently.
+refused plan "$scene" -o "$work/none.plan" --schedule "$work/bad.csv"
+says 'schedule is no option of plan'
+absent "$work" none.plan
+refused check "$plan" --method blanket
+says 'method is no option of check'
+refused check "$plan" -o "$work/none.plan"
+refused check "$plan" --overwrite
+refused info "$scene" -o "$work/none"
+says 'o is no option of info'
+refused info "$scene" --json
+refused picture "$plan" -o "$work/none.svg" --schedule "$work/bad.csv"
+absent "$work" none.svg
+refused plan "$scene" -o "$work/none.plan" --of blanket
+says 'of is no option of plan'
+
+# Limits of a scene are told where they stand.
+printf 'morphplan: 1\nstructure:\n  nodes: [4, 4]\n  spacing: 0.1\n  angle: {link_post: [0, 180]}\ntarget: {shape: sphere, radius: 0.1}\n' >"$work/angle.yaml"
+expect 2 "$program" info "$work/angle.yaml"
+says 'angle.yaml:5: structure.angle.link_post\[0\]: 0 is too small, allowed: a number above 0 and below 180 degrees'
+sed 's/link_post: .*}/link_post: [90, 90]}/' "$work/angle.yaml" >"$work/angle_90.yaml"
+refused info "$work/angle_90.yaml"
+says 'angle_90.yaml:5: .*the larger must be above the smaller'
+sed 's/  angle: .*/  link: {length: {bottom: [0.1, 0.1]}}/' "$work/angle.yaml" >"$work/rigid.yaml"
+expect 0 "$program" info "$work/rigid.yaml"
+{ cat "$scene" && echo 'schedule: {duration: 300}'; } >"$work/long.yaml"
+refused plan "$work/long.yaml" -o "$work/long.plan"
+says 'long.yaml:[0-9]*: schedule.duration: 300 s at a schedule.sample of 0.001 s is too many samples, allowed: at most 200000'
+absent "$work" long.plan
+
+# Coarse samples: what posts and lengths do between samples is not held against a plan.
+{ cat "$scene" && echo 'schedule: {sample: 0.02}'; } >"$work/coarse.yaml"
+expect 0 "$program" plan "$work/coarse.yaml" -o "$work/coarse.plan" --quiet
+expect 0 "$program" check "$work/coarse.plan" --quiet
+rm -r "$work/coarse.plan"
 
 # What comes later is refused by name.
 later() {

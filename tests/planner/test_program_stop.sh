@@ -23,14 +23,16 @@ ends() {
     if [ "$code" -ne "$1" ]; then fault "exit $code instead of $1"; fi
 }
 
+# marked_stopped FOLDER
 marked_stopped() {
-    holds "a folder that is marked stopped" [ "$(outcome box.plan)" = stopped ]
+    holds "a folder that is marked stopped" [ "$(outcome "$1")" = stopped ]
     holds "the outcome line says so" grep -q '^outcome    stopped' "$work/out"
     holds "six lines" [ "$(wc -l <"$work/out")" -eq 6 ]
     no_leftovers .
-    holds "six files" [ "$(ls -A box.plan | wc -l)" -eq 6 ]
+    holds "six files" [ "$(ls -A "$1" | wc -l)" -eq 6 ]
+    holds "its place is told" grep -qx "folder     $1" "$work/out"
     # What it holds can be read and judged: fit for use or not, but whole.
-    run "$program" check box.plan
+    run "$program" check "$1"
     holds "check says holds or findings, not exit $code" [ "$code" -eq 0 -o "$code" -eq 3 ]
 }
 
@@ -39,14 +41,36 @@ start refine
 sleep 0.3
 kill -INT "$pid"
 ends 4
-marked_stopped
+marked_stopped box.plan
 rm -r box.plan
 
 # As another program would ask.
 start path
 kill -TERM "$pid"
 ends 4
-marked_stopped
+marked_stopped box.plan
+
+# What is there already stays, and the stopped plan goes beside it, over an older stopped one; but over nothing else.
+fingerprint box.plan >"$work/before"
+for round in 1 2; do
+    start path
+    kill -INT "$pid"
+    ends 4
+    unchanged box.plan "$work/before"
+    says 'box.plan stays as it was, the best so far is in box.plan.stopped'
+    marked_stopped box.plan.stopped
+done
+rm -r box.plan.stopped
+mkdir box.plan.stopped && echo mine >box.plan.stopped/notes.txt
+fingerprint box.plan.stopped >"$work/notes"
+start path
+kill -INT "$pid"
+ends 2
+says 'box.plan.stopped: is there already and no stopped plan'
+unchanged box.plan "$work/before"
+unchanged box.plan.stopped "$work/notes"
+no_leftovers .
+rm -r box.plan.stopped
 
 # The second signal does not wait; the plan of before is as it was.
 fingerprint box.plan >"$work/before"
@@ -70,5 +94,5 @@ rm -r box.plan
 start target
 kill -INT "$pid"
 ends 4
-if [ -e box.plan ]; then marked_stopped; fi
+if [ -e box.plan ]; then marked_stopped box.plan; fi
 no_leftovers .

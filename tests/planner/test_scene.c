@@ -498,6 +498,55 @@ static void test_shared_models(void **state) {
         read_scene(MORPH_SOURCE_DIR "/tests/scenes", names[k]);
 }
 
+/* A link may be rigid: least and most the same, of all kinds or of one. */
+static void test_rigid_links(void **state) {
+    (void)state;
+    static const char *const lengths[] = {"[0.1, 0.1]", "{bottom: [0.1, 0.1]}", "{top: [0.1, 0.1]}",
+                                          "{brace: [1, 1]}"};
+    for (int k = 0; k < 4; k++) {
+        char text[256];
+        snprintf(text, sizeof text,
+                 "morphplan: 1\nstructure: {nodes: [3, 3], spacing: 0.1, bracing: web, link: {length: %s}}\n"
+                 "target: {shape: sphere, radius: 0.1}\n",
+                 lengths[k]);
+        morph_scene *scene = parse("rigid.yaml", text);
+        morph_structure *s = NULL;
+        assert_int_equal(morph_structure_create(&scene->structure, &s), MORPH_OK);
+        for (int l = 0; l < s->links; l++) {
+            const bool rigid = k == 0 ? s->link_kind[l] != MORPH_LINK_BRACE : s->link_kind[l] == k - 1;
+            assert_int_equal(s->length_limit[l][0] == s->length_limit[l][1], rigid);
+            if (rigid) assert_true(s->length_limit[l][0] == s->start_length[l]);
+        }
+        assert_round_trip(scene, "rigid.yaml", NULL);
+        morph_structure_destroy(s);
+        morph_scene_destroy(scene);
+    }
+}
+
+/* As many samples as a plan can hold, rounding of their quotient included, and no more. */
+static void test_longest_duration(void **state) {
+    (void)state;
+    static const struct {
+        const char *schedule;
+        bool good;
+    } cases[] = {{"{duration: 200, sample: 0.001}", true},
+                 {"{duration: 60, sample: 0.0003}", true},
+                 {"{duration: 100000, sample: 0.5}", true},
+                 {"{duration: 60.0003, sample: 0.0003}", false},
+                 {"{duration: 0.200001, sample: 0.000001}", false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char text[256];
+        snprintf(text, sizeof text, MINIMAL "schedule: %s\n", cases[k].schedule);
+        morph_scene *scene;
+        int faults = 0;
+        assert_int_equal(
+            morph_scene_parse("long.yaml", text, strlen(text), print_fault, ignore, &faults, &scene),
+            cases[k].good ? MORPH_OK : MORPH_ERR_INPUT);
+        assert_int_equal(faults, cases[k].good ? 0 : 1);
+        morph_scene_destroy(scene);
+    }
+}
+
 static void count_warning(void *user, const char *line) {
     ++*(int *)user;
     assert_non_null(strstr(line, "s.yaml:3: target.at: the target lies beside the grid (in y)"));
@@ -518,12 +567,13 @@ static void test_warning(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults), cmocka_unit_test(test_every_key),
-        cmocka_unit_test(test_written),  cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_numbers),  cmocka_unit_test(test_number_grammar),
-        cmocka_unit_test(test_locale),   cmocka_unit_test(test_files),
-        cmocka_unit_test(test_examples), cmocka_unit_test(test_shared_models),
-        cmocka_unit_test(test_warning),
+        cmocka_unit_test(test_defaults),         cmocka_unit_test(test_every_key),
+        cmocka_unit_test(test_written),          cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_numbers),          cmocka_unit_test(test_number_grammar),
+        cmocka_unit_test(test_locale),           cmocka_unit_test(test_files),
+        cmocka_unit_test(test_examples),         cmocka_unit_test(test_shared_models),
+        cmocka_unit_test(test_warning),          cmocka_unit_test(test_rigid_links),
+        cmocka_unit_test(test_longest_duration),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -142,7 +142,8 @@ static const bad_case cases[] = {
     {7, "    length: 0.1", 7, "structure.link.length", "0.1, allowed: a pair [shortest, longest]"},
     {7, "    length: [0.08]", 7, "structure.link.length", "a list of 1, allowed: a list of 2"},
     {7, "    length: [0.13, 0.08]", 7, "structure.link.length", "[0.13, 0.08] is inverted"},
-    {7, "    length: [0.1, 0.1]", 7, "structure.link.length", "[0.1, 0.1] is empty"},
+    {7, "    length: [0.09, 0.09]", 7, "structure.link.length",
+     "[0.09, 0.09] leaves out the start length 0.1"},
     {7, "    length: [-0.1, 0.2]", 7, "structure.link.length[0]", "-0.1 is negative"},
     {7, "    length: [0.11, 0.2]", 7, "structure.link.length", "leaves out the start length 0.1"},
     {7, "    length: [0.05, 0.09]", 7, "structure.link.length", "[0.05, 0.09] leaves out the start length"},
@@ -164,7 +165,14 @@ static const bad_case cases[] = {
     {7, "    stuck: [-1]", 7, "structure.link.stuck[0]", "-1 is too small"},
     /* angles */
     {9, "    link_post: [55, 180.5]", 9, "structure.angle.link_post[1]",
-     "180.5 is too large, allowed: a number of at least 0"},
+     "180.5 is too large, allowed: a number above 0 and below 180 degrees"},
+    {9, "    link_post: [0, 125]", 9, "structure.angle.link_post[0]",
+     "0 is too small, allowed: a number above 0 and below 180 degrees"},
+    {9, "    link_post: [55, 180]", 9, "structure.angle.link_post[1]",
+     "180 is too large, allowed: a number above 0 and below 180 degrees"},
+    {9, "    link_link: [0, 130]", 9, "structure.angle.link_link[0]", "0 is too small"},
+    {9, "    link_post: [90, 90]", 9, "structure.angle.link_post",
+     "[90, 90] is empty, allowed: the larger must be above the smaller"},
     {9, "    link_post: [-5, 125]", 9, "structure.angle.link_post[0]", "-5 is negative"},
     {9, "    link_post: [125, 55]", 9, "structure.angle.link_post", "inverted"},
     {9, "    link_post: [95, 125]", 9, "structure.angle.link_post", "[95, 125] leaves out 90"},
@@ -264,7 +272,10 @@ static const bad_case cases[] = {
     {20, "  duration: 0", 20, "schedule.duration", "0 is too small"},
     {20, "  duration: 1.0005", 20, "schedule.duration",
      "no whole number of samples, allowed: a multiple of 0.001 s"},
-    {20, "  duration: 2000", 20, "schedule.duration", "too many samples"},
+    {20, "  duration: 200.001", 20, "schedule.duration",
+     "200.001 s at a schedule.sample of 0.001 s is too many samples, allowed: at most 200000, so a duration "
+     "of "
+     "at most 200 s or a schedule.sample of at least 0.001000005 s"},
     {20, "  sample: 0", 20, "schedule.sample", "0 is too small"},
     {20, "  samples: 1", 20, "schedule.samples", "did you mean sample?"},
     /* understood, but of a later version */
