@@ -156,9 +156,10 @@ static bool set_plane(const morph_blanket_state *b, morph_contact *c, const doub
     const double aim = radius + CONTACT_MARGIN * b->structure->spacing;
     c->level = morph_dot(c->normal, q) - (phi - aim) / fmax(slope, LEAST_SLOPE);
     /* What was inside before this step comes out at the speed of a fall of half a spacing at most: the depth
-     * of a place found anew, over a short step, would be a blow. */
+     * of a place found anew, over a short step, would be a blow. What is faster must be stopped at once. */
     const double depth = c->level - morph_dot(c->normal, c->before);
-    const double most = b->pull > 0.0 ? sqrt(b->pull * b->structure->spacing) * b->step : INFINITY;
+    const double fall = b->pull > 0.0 ? sqrt(b->pull * b->structure->spacing) * b->step : INFINITY;
+    const double most = b->moved > 5.0 * fall ? INFINITY : fall;
     if (depth > most) c->level -= depth - most;
     c->radius = radius;
     return true;
@@ -270,7 +271,8 @@ double morph_blanket_moved(const morph_blanket_state *b, const double *x) {
 }
 
 void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
-    const double move = morph_blanket_moved(b, x) + fabs(b->lift_to - b->lift);
+    b->moved = morph_blanket_moved(b, x);
+    const double move = b->moved + fabs(b->lift_to - b->lift);
     b->contacts = 0;
     for (int t = 0; t < b->touches; t++)
         find_target(b, &b->touch[t], x, move);

@@ -103,6 +103,7 @@ typedef struct morph_blanket_state {
     bool held_up;
     double retreat;          /* of a target that was held up, m/s */
     double good_step;        /* that should be stable and resolves what forces do, s */
+    double moved;            /* longest motion of a joint in this step, before it is corrected, m */
     double changed;          /* largest motion by a correction in this sweep, m */
     double most_move;        /* m in a step */
     double work;             /* done on the blanket since the frame's start by what it does not store, J */

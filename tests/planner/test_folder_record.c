@@ -41,7 +41,8 @@ static size_t entries_of(const morph_record *r, const morph_dataset *set) {
 static void assert_same(const morph_record *a, const morph_record *b) {
     morph_record ca = *a, cb = *b;
     for (int i = 0; i < morph_record_count_total; i++)
-        assert_int_equal(*morph_record_count(&ca, i), *morph_record_count(&cb, i));
+        if (a->poses > 0 || morph_record_counts[i] != offsetof(morph_record, pose_width))
+            assert_int_equal(*morph_record_count(&ca, i), *morph_record_count(&cb, i));
     for (int i = 0; i < morph_record_dataset_total; i++) {
         const morph_dataset *set = &morph_record_datasets[i];
         const void *x = morph_record_array(a, set), *y = morph_record_array(b, set);
