@@ -107,7 +107,7 @@ static void round_trip(void **state) {
                 free(morph_record_array(&r, set));
                 morph_record_set_array(&r, set, NULL);
             }
-            r.samples = r.poses = r.pose_width = r.mobility_samples = 0;
+            r.samples = r.poses = r.mobility_samples = 0;
         }
         write_fixture(&r);
         char message[256] = "";
