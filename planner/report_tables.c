@@ -217,6 +217,16 @@ void morph_report_structure(morph_text *page, const morph_record *r, const morph
                        "Lengths alone fix the shape: no motion stays free. The least singular value is %.3g; "
                        "the smaller, the softer.",
                        s->sigma_min);
+    if (s->replay.done)
+        morph_text_add(
+            page,
+            " Replayed%s, the lengths alone end with a joint %.2g spacings from the plan (mean square %.2g), "
+            "rigid motion removed.",
+            s->replay.floating ? " without gravity" : " under gravity", s->replay.most / s->spacing,
+            s->replay.rms / s->spacing);
+    if (s->replay_core.done)
+        morph_text_add(page, " With the target as a solid core: %.2g (%.2g).",
+                       s->replay_core.most / s->spacing, s->replay_core.rms / s->spacing);
     if (s->redundant > 0)
         morph_text_add(page,
                        " %d links are redundant: their lengths must fit the others', or actuators fight.",

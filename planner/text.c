@@ -40,10 +40,12 @@ char *morph_plan_text(const morph_summary *s, const char *folder) {
                 morph_margin_unit(s->check.worst), m->element, m->time);
     fprintf(out, "duration   %.3f s\n", s->duration);
     if (s->free_motions > 0)
-        fprintf(out, "mobility   %d free motions: lengths alone do not fix this shape\n", s->free_motions);
+        fprintf(out, "mobility   %d free motions: lengths alone do not fix this shape", s->free_motions);
     else
-        fprintf(out, "mobility   no free motion: lengths fix this shape (least singular value %.3g)\n",
+        fprintf(out, "mobility   no free motion: lengths fix this shape (least singular value %.3g)",
                 s->sigma_min);
+    if (s->replay.done) fprintf(out, ", replayed they end %.2g spacings off", s->replay.most / s->spacing);
+    fprintf(out, "\n");
     fprintf(out, "folder     %s\n", folder);
     if (fclose(out) != 0) {
         free(text);
