@@ -38,9 +38,4 @@ typedef struct morph_shape_report {
 morph_status morph_shape_from_lengths(const morph_structure *s, const double *lengths, const double *x_start,
                                       double *x_out, morph_shape_report *report);
 
-/* Largest distance of a joint of a from its counterpart in b (3*joints each) after the rigid motion (no
- * mirror) of a that brings the two closest in the least-squares sense; m. moved (3*joints, may be NULL or a):
- * a after that motion. */
-double morph_shape_distance(int joints, const double *a, const double *b, double *moved);
-
 #endif

@@ -62,6 +62,22 @@ static morph_status measure_lifted(const planner *p, const double *x, double lif
     return status;
 }
 
+/* Whether the blanket's lengths jump: the largest second difference from frame to frame. */
+static void note_jumps(planner *p) {
+    const morph_record *r = &p->plan->record;
+    morph_summary *s = &p->plan->summary;
+    const size_t links = (size_t)r->links;
+    for (int f = 1; f + 1 < r->nominal_frames; f++)
+        for (size_t l = 0; l < links; l++) {
+            const double *at = &r->nominal_lengths[(size_t)f * links + l];
+            const double jump = fabs(at[links] - 2.0 * at[0] + *(at - links));
+            if (jump <= s->largest_jump) continue;
+            s->largest_jump = jump;
+            s->jump_link = (int)l;
+            s->jump_time = r->nominal_time[f];
+        }
+}
+
 /* Says what stood against a rising target. */
 static void note_held_up(planner *p) {
     static const char *const limits[] = {"length", "angle", "post", "panel", "clearance"};
@@ -155,6 +171,7 @@ static morph_status stage_nominal(planner *p) {
         status = measure_lifted(p, last, p->nominal.lift[p->nominal.frames - 1], &s->blanket);
         s->has_blanket = status == MORPH_OK;
     }
+    if (status == MORPH_OK) note_jumps(p);
     if (status == MORPH_OK && s->blanket_report.held_up) note_held_up(p);
     if (status == MORPH_OK && s->deformable.used) note_deformable(p);
     note_time(p, MORPH_STAGE_NOMINAL, since);

@@ -12,7 +12,7 @@ morph_refine_options morph_refine_defaults(void) {
     return (morph_refine_options){.inset = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
                                   .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.01,
-                                  .press = 0.3,
+                                  .press = 0.5,
                                   .reach = 0.3,
                                   .least_reach = 0.03,
                                   .hold = 1e-3,

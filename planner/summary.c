@@ -183,6 +183,10 @@ static void put_details(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, run, "step_halvings", r->step_halvings);
     put_bool(b, run, "at_rest", r->at_rest);
     put_number(b, run, "rest_speed", r->rest_speed);
+    cJSON *jump = put_object(b, run, "largest_second_difference");
+    put_number(b, jump, "length", s->largest_jump);
+    put_number(b, jump, "link", s->jump_link);
+    put_number(b, jump, "time", s->jump_time);
     put_number(b, run, "worst_length", r->worst_length);
     put_number(b, run, "worst_post", r->worst_post);
     put_number(b, run, "worst_clearance", r->worst_clearance);

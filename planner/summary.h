@@ -43,6 +43,10 @@ typedef struct morph_summary {
     double total_seconds;
     long peak_memory_bytes;
     morph_blanket_report blanket_report;
+    /* Largest second difference of a link's length over the blanket's frames, m per frame^2: jumps show. */
+    double largest_jump;
+    int jump_link; /* its link */
+    double jump_time;
     morph_replay_report replay, replay_core; /* without the target, and with it as a solid */
     morph_deformable_report deformable;
     double sdf_cell, sdf_rms, sdf_max;
