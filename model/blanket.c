@@ -31,6 +31,8 @@
 #define RETREAT 0.02
 /* Then a little more each time the frame is done again, at most this often. */
 #define MOST_RETREATS 12
+/* Times that a frame is run again because exact distances found the target inside. */
+#define MOST_REVIEWS 4
 
 /* Beyond these a run is not meant: 1e7 steps a frame would take hours. */
 #define MOST_STEPS 1e6
@@ -262,6 +264,17 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
         } else
             b->retreat += RETREAT * b->structure->spacing / b->def.frame;
         b->held_up = report->held_up = true;
+        status = next_frame(b, &at, steps, report);
+        if (status != MORPH_OK) return status;
+        v = record(b, time, t);
+    }
+    /* A part of the target that came between the places: now that exact distances have put places there, the
+     * frame is run again. */
+    for (int tries = 0; tries < MOST_REVIEWS && !b->soft && !b->def.drive &&
+                        v.clearance > MORPH_BLANKET_CLEARANCE_HELD * b->structure->spacing;
+         tries++) {
+        t->frames--;
+        rewind_frame(b, &at);
         status = next_frame(b, &at, steps, report);
         if (status != MORPH_OK) return status;
         v = record(b, time, t);

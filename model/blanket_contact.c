@@ -435,7 +435,9 @@ void morph_blanket_seek_deepest(morph_blanket_state *b) {
         double q[3];
         place_of(b->x, t->joint, t->corners, t->weight, q);
         const double here = distance_at(b, q, NULL) - t->radius;
-        if (memo->gap >= 0.0 && memo->gap > here - SEEK_GAIN * s->spacing) continue;
+        if (memo->gap >= -MORPH_BLANKET_CLEARANCE_HELD * s->spacing &&
+            memo->gap > here - SEEK_GAIN * s->spacing)
+            continue;
         memcpy(t->weight, memo->weight, sizeof t->weight);
         t->stride = SHORTEST_STRIDE;
         t->wake = 0.0;

@@ -12,9 +12,9 @@
 #define BETTER 0.9
 /* Deeper than this, in spacings, a part of the target has come between the places that the steps look at;
  * shallower, polishing the frame alone is enough and the motion is left in peace. */
-#define ENTERED 0.06
+#define ENTERED 0.1
 /* Rounds with contact by exact distances, which cost a tree search per element. */
-#define EXACT_ROUNDS 8
+#define EXACT_ROUNDS 12
 /* Of lengths, posts, panels and angles at x. */
 static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
