@@ -56,7 +56,8 @@ static morph_status trajectory_create(morph_trajectory *t, int capacity, int joi
     return MORPH_ERR_NOMEM;
 }
 
-/* A frame is the state with its limits polished; the motion itself goes on unpolished. */
+/* A frame is the state with its limits polished; the motion itself goes on unpolished, unless the frame had
+ * to be brought out of the target. */
 static morph_violation record(morph_blanket_state *b, double time, morph_trajectory *t) {
     double *x = &t->x[(size_t)t->frames * 3 * (size_t)b->joints];
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));

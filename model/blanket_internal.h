@@ -130,7 +130,7 @@ typedef struct morph_blanket_state {
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
-    /* Polishing a frame works on these copies' originals and puts them back: the motion never feels it. */
+    /* Polishing a frame works on these copies' originals and puts them back. */
     double (*spare_push)[2];
     morph_angle *spare_angle;
     morph_touch *spare_touch;
