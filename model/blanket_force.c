@@ -19,6 +19,11 @@ double morph_blanket_pull(const morph_structure *s, const morph_blanket_def *def
     return def->gravity + (pull + push) / s->def.mass;
 }
 
+/* The blanket's own and the scene's. */
+static double square_of(const morph_structure *s, const morph_blanket_def *def) {
+    return def->square + s->def.square;
+}
+
 /* A link's spring has the stiffness block k d d^T between its joints and minus that across. By Gershgorin's
  * theorem in blocks no squared frequency of K/m exceeds max over joints of sum over its links (k + k) / m,
  * whatever the pose; a centre of attraction adds at most s/e^3 / m. The leapfrog is stable for
@@ -44,7 +49,7 @@ double morph_blanket_stable_step(const morph_structure *s, const morph_blanket_d
         arm = fmin(arm, s->length_limit[l][0]);
     for (int p = 0; p < s->posts; p++)
         arm = fmin(arm, s->post_length[p]);
-    square += 4.0 * 16.0 * def->square * 4.0 / (arm * arm);
+    square += 4.0 * 16.0 * square_of(s, def) * 4.0 / (arm * arm) + morph_blanket_angle_stiffness(s);
     return 0.5 / sqrt(square / s->def.mass);
 }
 
@@ -67,7 +72,7 @@ static void add_springs(morph_blanket_state *b) {
 
 /* Adds the angle springs' -k c grad c over m. Link-post tuples come first. */
 static void add_squares(morph_blanket_state *b) {
-    const double scale = b->def.square / b->structure->def.mass;
+    const double scale = square_of(b->structure, &b->def) / b->structure->def.mass;
     for (int t = 0; t < b->structure->link_posts; t++) {
         const morph_angle *a = &b->angle[t];
         double c, grad[4][3];
@@ -99,7 +104,8 @@ void morph_blanket_accelerations(morph_blanket_state *b) {
             b->a[3 * hand->joint + k] += inverse * hand->force[k];
     }
     if (!b->def.drive) add_springs(b);
-    if (b->def.square > 0.0) add_squares(b);
+    if (square_of(b->structure, &b->def) > 0.0) add_squares(b);
+    if (b->structure->def.angle_stiffness > 0.0) morph_blanket_add_angles(b);
     for (int j = 0; j < b->joints && b->def.fixed_count > 0; j++)
         for (int k = 0; k < 3; k++)
             b->a[3 * j + k] *= b->weight[j];
@@ -120,10 +126,11 @@ void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, doubl
 }
 
 double morph_blanket_energy(const morph_blanket_state *b) {
-    double kinetic, spring, height = 0.0, attraction = 0.0, angles = 0.0;
-    for (int t = 0; t < b->structure->link_posts && b->def.square > 0.0; t++) {
+    const double square = square_of(b->structure, &b->def);
+    double kinetic, spring, height = 0.0, attraction = 0.0, angles = morph_blanket_angle_energy(b);
+    for (int t = 0; t < b->structure->link_posts && square > 0.0; t++) {
         const double c = morph_blanket_cosine(&b->angle[t], b->x);
-        angles += 0.5 * b->def.square * c * c;
+        angles += 0.5 * square * c * c;
     }
     morph_blanket_energies(b, &kinetic, &spring);
     const double soft = morph_blanket_softening(b->structure, &b->def);

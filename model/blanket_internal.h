@@ -156,6 +156,12 @@ void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, doubl
 /* One step of b->step. False when the state is not finite any more or moves further than most_move. */
 bool morph_blanket_step(morph_blanket_state *b);
 
+/* blanket_angle.c: the springs at the angle limits (structure.def.angle_stiffness). */
+void morph_blanket_add_angles(morph_blanket_state *b);           /* to a */
+double morph_blanket_angle_energy(const morph_blanket_state *b); /* J */
+/* Bound on the stiffness matrix's eigenvalues while angles and lengths are within limits, N/m. */
+double morph_blanket_angle_stiffness(const morph_structure *s);
+
 /* blanket_schedule.c: where the target and the prescribed lengths are at the end of the coming step. */
 void morph_blanket_schedule(morph_blanket_state *b);
 /* Lift of the target after it has risen for `clock` seconds, m. */

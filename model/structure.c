@@ -21,7 +21,8 @@ morph_structure_def morph_structure_defaults(double spacing) {
         .stiffness = 200.0,
         .damping = 0.5,
         .link_post = {55.0 * deg, 125.0 * deg},
-        .link_link = {50.0 * deg, 130.0 * deg}};
+        .link_link = {50.0 * deg, 130.0 * deg},
+        .angle_soft = 5.0 * deg};
     return def;
 }
 
@@ -36,6 +37,9 @@ static bool def_ok(const morph_structure_def *d) {
         if (!(isfinite(positive[k]) && positive[k] > 0.0)) return false;
     if (!(isfinite(d->radius) && d->radius >= 0.0) || !(isfinite(d->damping) && d->damping >= 0.0))
         return false;
+    const double least_zero[] = {d->angle_stiffness, d->angle_soft, d->square};
+    for (size_t k = 0; k < sizeof least_zero / sizeof *least_zero; k++)
+        if (!(isfinite(least_zero[k]) && least_zero[k] >= 0.0)) return false;
     for (int k = 0; k < 3; k++)
         if (!pair_ok(d->length[k])) return false;
     if (d->nodes[0] < 2 || d->nodes[1] < 2 || d->nodes[0] > 1024 || d->nodes[1] > 1024) return false;

@@ -42,8 +42,12 @@ typedef struct morph_structure_def {
     double rate, acceleration, jerk;
     double stiffness, damping;         /* blanket springs: N/m, N s/m */
     double link_post[2], link_link[2]; /* angle limits */
-    morph_fixed fixed;                 /* nodes held where they start */
-    int fixed_nodes;                   /* of MORPH_FIXED_LIST, else not looked at */
+    /* The blanket's springs at them: energy angle_stiffness/2 (excess over the limit less angle_soft)^2 of
+     * each angle, none on the far side, N m and radians; and `square`/2 cos^2 of each link-post angle, N m.
+     * 0: none. */
+    double angle_stiffness, angle_soft, square;
+    morph_fixed fixed;          /* nodes held where they start */
+    int fixed_nodes;            /* of MORPH_FIXED_LIST, else not looked at */
     const int (*fixed_node)[2]; /* (i, j), repeats allowed; borrowed (a structure's own def: its copy) */
 } morph_structure_def;
 

@@ -41,6 +41,9 @@ static const char *const known[] = {
     "structure.link.length.brace",
     "structure.angle.link_post",
     "structure.angle.link_link",
+    "structure.angle.stiffness",
+    "structure.angle.soft",
+    "structure.angle.square",
     "target.shape",
     "target.size",
     "target.radius",
@@ -105,16 +108,18 @@ static int names_under(const char *section, const char **names) {
     return count;
 }
 
-/* The one path elsewhere that ends in this key, or NULL if there is none or more than one. */
-static const char *elsewhere(const char *key) {
-    const char *found = NULL;
+/* The one path elsewhere that ends in this key, or the two; false if there is none or more. */
+static bool elsewhere(const char *key, char *text, size_t size) {
+    int found = 0;
+    text[0] = '\0';
     for (int k = 0; k < KNOWN; k++) {
         const char *dot = strrchr(known[k], '.');
         if (strcmp(dot ? dot + 1 : known[k], key) != 0) continue;
-        if (found) return NULL;
-        found = known[k];
+        const size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%s", found > 0 ? " or " : "", known[k]);
+        found++;
     }
-    return found;
+    return found == 1 || found == 2;
 }
 
 static void report_unknown(const morph_value *map, const morph_value *key, const char *const *names,
@@ -126,11 +131,12 @@ static void report_unknown(const morph_value *map, const morph_value *key, const
     const char *word =
         key->node && key->node->type == YAML_SCALAR_NODE ? (const char *)key->node->data.scalar.value : "";
     const char *meant = morph_closest_name(word, names, count);
-    const char *there = meant ? NULL : elsewhere(word);
+    char there[512];
+    const bool known_elsewhere = !meant && elsewhere(word, there, sizeof there);
     if (meant)
         morph_fault_add(map->yaml, key->line, full, "unknown key, did you mean %s? allowed: %s", meant,
                         allowed);
-    else if (there)
+    else if (known_elsewhere)
         morph_fault_add(map->yaml, key->line, full, "unknown key here, did you mean %s? allowed: %s", there,
                         allowed);
     else

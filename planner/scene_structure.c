@@ -25,6 +25,8 @@ static const morph_range stiffness_range = {0.0, MORPH_SCENE_LARGEST, true, "N/m
 static const morph_range damping_range = {0.0, MORPH_SCENE_LARGEST, false, "N s/m"};
 /* At 0 and at 180 degrees two members lie in one line: no limit, but an end of all angles. */
 static const morph_range angle_range = {0.0, 180.0, 2, "degrees"};
+static const morph_range soft_range = {0.0, 90.0, false, "degrees"};
+static const morph_range spring_range = {0.0, MORPH_SCENE_LARGEST, false, "N m"};
 static const morph_range force_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "N"};
 
 static morph_found read_number(const morph_value *map, const char *key, const morph_range *range,
@@ -73,6 +75,9 @@ static void set_defaults(morph_structure_def *def, double spacing) {
         settle_length(lengths[k]);
     settle_angles(def->link_post);
     settle_angles(def->link_link);
+    double soft[2] = {def->angle_soft, def->angle_soft};
+    settle_angles(soft);
+    def->angle_soft = soft[0];
 }
 
 /* nodes and spacing, which have no default. */
@@ -232,6 +237,15 @@ static void read_angle(const morph_value *angle, const char *key, double out[2])
         out[k] = morph_radians(degrees[k]);
 }
 
+/* Springs at the limits, and those that hold posts square to their links. */
+static void read_springs(const morph_value *angle, morph_structure_def *def) {
+    double degrees;
+    read_number(angle, "stiffness", &spring_range, &def->angle_stiffness);
+    if (read_number(angle, "soft", &soft_range, &degrees) == MORPH_FOUND)
+        def->angle_soft = morph_radians(degrees);
+    read_number(angle, "square", &spring_range, &def->square);
+}
+
 /* The list of nodes held; each once, since a second time is a slip. */
 static void read_fixed_list(morph_scene_reader *r, const morph_value *fixed) {
     morph_scene *scene = r->scene;
@@ -322,4 +336,5 @@ void morph_scene_read_structure(morph_scene_reader *r, const morph_value *root) 
     const morph_value angle = morph_scene_section(&map, "angle");
     read_angle(&angle, "link_post", def->link_post);
     read_angle(&angle, "link_link", def->link_link);
+    read_springs(&angle, def);
 }

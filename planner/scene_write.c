@@ -132,6 +132,11 @@ static void put_structure(buffer *b, const morph_structure_def *def) {
     put(b, "  angle:\n");
     put_numbers(b, "    link_post", def->link_post, 2, true);
     put_numbers(b, "    link_link", def->link_link, 2, true);
+    char soft[MORPH_NUMBER_TEXT];
+    morph_degrees_print(def->angle_soft, soft);
+    put_number(b, "    stiffness", def->angle_stiffness);
+    put(b, "    soft: %s\n", soft);
+    put_number(b, "    square", def->square);
 }
 
 static bool put_target(buffer *b, const morph_target_def *def, const char *file) {

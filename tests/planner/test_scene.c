@@ -114,6 +114,9 @@ static const char full[] =
     "  angle:\n"
     "    link_post: [60.1, 119.7]\n"
     "    link_link: [51, 131.3]\n"
+    "    stiffness: 0.7\n"
+    "    soft: 7.3\n"
+    "    square: 0.05\n"
     "target:\n"
     "  shape: box\n"
     "  size: [0.15, 0.15, 0.10]\n"
@@ -203,6 +206,8 @@ static void assert_same_scene(const morph_scene *a, const morph_scene *b) {
     assert_true(same(d->acceleration, e->acceleration) && same(d->stiffness, e->stiffness));
     assert_true(same(d->damping, e->damping));
     assert_true(same_array(d->link_post, e->link_post, 2) && same_array(d->link_link, e->link_link, 2));
+    assert_true(same(d->angle_stiffness, e->angle_stiffness) && same(d->square, e->square));
+    assert_true(same(d->angle_soft, e->angle_soft));
     const morph_target_def *t = &a->target_def, *u = &b->target_def;
     assert_true(t->shape == u->shape && t->has_fit == u->has_fit);
     assert_true(same_array(t->size, u->size, 3) && same_array(t->radii, u->radii, 3));
@@ -263,6 +268,9 @@ static void test_written(void **state) {
                                        "    stuck: []\n",
                                        "    link_post: [55, 125]\n",
                                        "    link_link: [50, 130]\n",
+                                       "    stiffness: 0\n",
+                                       "    soft: 5\n",
+                                       "    square: 0\n",
                                        "target:\n",
                                        "  shape: box\n",
                                        "  size: [0.2, 0.3, 0.1]\n",

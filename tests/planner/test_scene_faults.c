@@ -65,7 +65,9 @@ static const bad_case cases[] = {
     {2, "\"ti\\ttle\": 1", 2, "\"ti?tle\"", "did you mean title"},
     {5, "  spacing: 0.1\n  thicknes: 0.05", 6, "structure.thicknes", "did you mean thickness?"},
     {5, "  spacing: 0.1\n  radius: 0.05", 6, "structure.radius", "unknown key, allowed: layout, nodes"},
-    {5, "  spacing: 0.1\n  stiffness: 5", 6, "structure.stiffness", "did you mean structure.link.stiffness?"},
+    {5, "  spacing: 0.1\n  stiffness: 5", 6, "structure.stiffness",
+     "did you mean structure.link.stiffness or structure.angle.stiffness?"},
+    {5, "  spacing: 0.1\n  damping: 5", 6, "structure.damping", "did you mean structure.link.damping?"},
     {5, "  spacing: 0.1\n  spacing: 0.2", 6, "structure.spacing", "given twice, first in line 5"},
     {7, "    radius: 0.004\n    accel: 1", 8, "structure.link.accel", "did you mean acceleration?"},
     {15, "  drag: 0.2\n  hieght: 1", 16, "motion.hieght", "did you mean height?"},
@@ -179,6 +181,19 @@ static const bad_case cases[] = {
     {9, "    link_post: [20, 85]", 9, "structure.angle.link_post", "leaves out 90"},
     {9, "    link_link: [91, 100]", 9, "structure.angle.link_link", "leaves out 90"},
     {9, "    link_link: 50", 9, "structure.angle.link_link", "50, allowed: a list of 2, each a number"},
+    /* springs at them */
+    {9, "    stiffness: -1", 9, "structure.angle.stiffness",
+     "-1 is negative, allowed: a number of at least 0 and at most 1e+09 N m"},
+    {9, "    stiffness: .nan", 9, "structure.angle.stiffness", "allowed: a number"},
+    {9, "    stiffness: soft", 9, "structure.angle.stiffness", "soft is no number"},
+    {9, "    soft: -5", 9, "structure.angle.soft", "-5 is negative"},
+    {9, "    soft: 90.5", 9, "structure.angle.soft", "90.5 is too large, allowed"},
+    {9, "    soft: .nan", 9, "structure.angle.soft", "allowed: a number"},
+    {9, "    soft: \"5\"", 9, "structure.angle.soft", "text in quotes"},
+    {9, "    square: -0.1", 9, "structure.angle.square", "-0.1 is negative"},
+    {9, "    square: .nan", 9, "structure.angle.square", "allowed: a number"},
+    {9, "    square: .inf", 9, "structure.angle.square", "allowed: a number"},
+    {9, "    square: [1]", 9, "structure.angle.square", "a list of 1 is no number"},
     {9, "    brace: [1, 2]", 9, "structure.angle.brace", "did you mean structure.link.length.brace?"},
     /* target */
     {11, "  shape: cube", 11, "target.shape", "cube is not known, allowed: box, sphere"},
@@ -405,7 +420,8 @@ static void test_sections(void **state) {
         "target: {shape: box, size: [1, 1, 1],\n  deformable: soft}\n";
     parse_bad(inner, strlen(inner));
     expect(3, "structure.link", "a list of 1 is no mapping, allowed: the keys length");
-    expect(4, "structure.angle", "90 is no mapping, allowed: the keys link_post, link_link");
+    expect(4, "structure.angle",
+           "90 is no mapping, allowed: the keys link_post, link_link, stiffness, soft, square");
     expect(6, "target.deformable", "soft is no mapping, allowed: the keys young, density");
     assert_int_equal(faults.count, 3);
 
