@@ -9,12 +9,16 @@
 
 #include <stdlib.h>
 
+/* The swept test of an element against what is near costs as much as a few distances. */
+#define WORTH 4.0
+
 typedef struct clearance {
     const morph_record *r;
     morph_mesh target;           /* the record's arrays */
     morph_motion joints, offset; /* offset.x is NULL when the target stands still */
     morph_solid *solid;
     morph_distance *exact;
+    morph_boxes *boxes;
     double lo[3], hi[3]; /* of the target at offset 0 */
     double *joint_radius;
     double skin_radius;
@@ -72,6 +76,7 @@ static morph_status target_create(clearance *c) {
     morph_status status = examine_closed(m, &closed);
     if (status == MORPH_OK) status = morph_solid_create(m->v, m->vertices, m->t, m->triangles, &c->solid);
     if (status == MORPH_OK) status = morph_distance_create(m, closed, &c->exact);
+    if (status == MORPH_OK) status = morph_boxes_create(m->v, m->t, m->triangles, &c->boxes);
     return status;
 }
 
@@ -100,6 +105,7 @@ static void clearance_free(clearance *c) {
     morph_motion_free(&c->offset);
     morph_solid_destroy(c->solid);
     morph_distance_destroy(c->exact);
+    morph_boxes_destroy(c->boxes);
     free(c->joint_radius);
 }
 
@@ -158,6 +164,33 @@ static double clearance_travel(void *data, double from, double to) {
     return most + (c->offset.x ? morph_motion_travel(&c->offset, 0, from, to) : 0);
 }
 
+/* By the swept test of every vertex and triangle and every two edges of the element and what is near of the
+ * target, straight from end to end of the span in the target's frame, with what both bend on the way added.
+ * At the span's ends the signed distance is larger than `distance`, so the element is outside there, and what
+ * never comes near the surface stays outside. */
+static bool clearance_apart(void *data, double from, double to, double least, double spare) {
+    const clearance *c = data;
+    const double distance = least + c->radius;
+    if (!(distance > 0)) return false;
+    const double time[2] = {from, to};
+    morph_swept_element e = {.corners = c->corners};
+    double bend = 0;
+    for (int i = 0; i < c->corners; i++)
+        bend = fmax(bend, morph_motion_bend(&c->joints, c->corner[i], from, to));
+    if (c->offset.x) bend += morph_motion_bend(&c->offset, 0, from, to);
+    if (bend > spare) return false;
+    for (int end = 0; end < 2; end++) {
+        double shift[3] = {0, 0, 0};
+        if (c->offset.x) morph_motion_point(&c->offset, 0, time[end], shift);
+        for (int i = 0; i < c->corners; i++) {
+            morph_motion_point(&c->joints, c->corner[i], time[end], e.at[end][i]);
+            for (int k = 0; k < 3; k++)
+                e.at[end][i][k] -= shift[k];
+        }
+    }
+    return morph_boxes_apart(c->boxes, &e, distance + bend);
+}
+
 /* Joints first, then links, then skin: of equals the first is named, and a joint says more than its links. */
 static int element_count(const morph_record *r) {
     return r->joints + r->links + r->skin_triangles;
@@ -212,18 +245,16 @@ static morph_status search(clearance *c, const morph_control *control, double h,
     /* Slack: a tenth of the tolerance, so that no depth beyond 1.1e-3 spacings passes unseen. Budget: a
      * sheet that slides over a plane a spacing far with everything in contact takes half of it, a usual plan
      * a thousandth; only a record that races along the surface runs out. */
-    morph_sweep s = {clearance_value,
-                     clearance_travel,
-                     c,
-                     1e-4 * r->spacing,
-                     1e-9 * r->spacing,
-                     INFINITY,
-                     0,
-                     r->samples,
-                     0,
-                     1000000 + 10000L * n,
-                     false,
-                     false};
+    morph_sweep s = {.value = clearance_value,
+                     .travel = clearance_travel,
+                     .apart = f->plain ? NULL : clearance_apart,
+                     .worth = WORTH,
+                     .data = c,
+                     .slack = 1e-4 * r->spacing,
+                     .tie = 1e-9 * r->spacing,
+                     .least = INFINITY,
+                     .finest = r->samples,
+                     .budget = 1000000 + 10000L * n};
     c->sweep = &s;
     ends(c, &s, value, m);
     int joint;
@@ -234,6 +265,8 @@ static morph_status search(clearance *c, const morph_control *control, double h,
         morph_progress(control, "check", 0.3 + 0.4 * (i + 1) / n);
     }
     if (s.failed) return c->status == MORPH_OK ? MORPH_ERR_NONFINITE : c->status;
+    f->evaluations += s.evaluations;
+    f->proofs += s.proofs;
     m->worst = s.least;
     m->time = s.at * h;
     f->clearance_resolution = r->deformed_v ? 0 : s.finest * h;

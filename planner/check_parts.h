@@ -32,6 +32,8 @@ typedef struct morph_finding {
 typedef struct morph_findings {
     morph_finding kind[MORPH_MARGIN_KINDS];
     double clearance_resolution; /* s */
+    bool plain;                  /* search by motion bounds alone, to compare with */
+    long evaluations, proofs;    /* of both clearances: distances taken; spans that the swept test settled */
     double interpolation;        /* m */
     char defect[256];            /* the first one found */
 } morph_findings;
@@ -98,6 +100,7 @@ typedef struct morph_motion {
     int samples, points;
     const double *x; /* samples x 3*points; not owned */
     double *travel;  /* samples x points: upper bound of the path length since sample 0 */
+    double *bend;    /* samples x points: how far the interval from there on departs from its chord at most */
 } morph_motion;
 
 /* samples >= 2. */
@@ -109,16 +112,23 @@ void morph_motion_point(const morph_motion *m, int point, double tau, double out
 /* No point is further from where it was than this: the path length between two times is not larger. */
 double morph_motion_travel(const morph_motion *m, int point, double from, double to);
 
+/* No point is further from where uniform motion along the chord of the two times has it. */
+double morph_motion_bend(const morph_motion *m, int point, double from, double to);
+
 /* Least value over time of a function that changes no faster than its travel. */
 typedef struct morph_sweep {
     double (*value)(void *data, double tau);              /* NaN: failed */
     double (*travel)(void *data, double from, double to); /* bound on the change of value */
+    /* True only if the value is at least `least` at all times of the span, at whose ends it is that and
+     * `spare` (>= 0) more; NULL: none. */
+    bool (*apart)(void *data, double from, double to, double least, double spare);
+    double worth; /* asked where motion bounds would need about so many times more spans, >= 1 */
     void *data;
     double slack; /* nothing below least - slack stays undiscovered (plus a hundredth of |least|) */
     double tie;   /* a value replaces the least only if lower by more than this */
     double least, at;
     double finest; /* shortest step between two evaluations that was needed, in samples */
-    long evaluations, budget;
+    long evaluations, budget, proofs;
     bool failed, exhausted;
 } morph_sweep;
 
@@ -126,5 +136,19 @@ typedef struct morph_sweep {
  * refined locally). Stops with failed (a value was NaN) or exhausted (budget spent, or motion too fast to
  * resolve). */
 bool morph_sweep_run(morph_sweep *s, double from, double from_value, double to, double to_value);
+
+/* Triangles of a mesh by boxes. */
+typedef struct morph_boxes morph_boxes;
+/* v, t (3 per triangle) are borrowed. MORPH_ERR_NOMEM. */
+morph_status morph_boxes_create(const double *v, const int *t, int triangles, morph_boxes **out);
+void morph_boxes_destroy(morph_boxes *b); /* NULL allowed */
+
+/* A joint (1 corner), link axis (2) or skin triangle (3) at two times, straight between them. */
+typedef struct morph_swept_element {
+    int corners;
+    double at[2][3][3];
+} morph_swept_element;
+/* Does the element keep more than `distance` (m, >= 0) from every triangle? False: no, or not proven. */
+bool morph_boxes_apart(const morph_boxes *b, const morph_swept_element *e, double distance);
 
 #endif

@@ -2,11 +2,14 @@
  * in each, boxes around what every bar sweeps give the pairs that can come near, and those are searched. */
 #include "planner/check_parts.h"
 
+#include "model/swept.h"
 #include "solvers/collision.h"
 
 #include <stdlib.h>
 
 enum { STRETCHES = 64 };
+/* The swept test costs about as much as three distances. */
+#define WORTH 2.0
 
 typedef struct bars {
     const morph_record *r;
@@ -92,6 +95,26 @@ static double bar_travel(const bars *s, int bar, double from, double to) {
 static double pair_travel(void *data, double from, double to) {
     const bars *s = data;
     return bar_travel(s, s->a, from, to) + bar_travel(s, s->b, from, to);
+}
+
+/* The swept test of the two axes, straight from end to end of the span, with what they may bend on the way
+ * added to the distance. Strict costs no more where the pair is well apart, as most are. */
+static bool pair_apart(void *data, double from, double to, double least, double spare) {
+    const bars *s = data;
+    const double distance = least + radius_of(s, s->a) + radius_of(s, s->b);
+    if (distance <= 0) return true; /* no two axes are nearer than that */
+    const int *ends[2] = {ends_of(s, s->a), ends_of(s, s->b)};
+    double x[2][2][2][3], bend[2] = {0, 0}; /* time, bar, end */
+    for (int bar = 0; bar < 2; bar++)
+        for (int e = 0; e < 2; e++) {
+            morph_motion_point(&s->motion, ends[bar][e], from, x[0][bar][e]);
+            morph_motion_point(&s->motion, ends[bar][e], to, x[1][bar][e]);
+            bend[bar] = fmax(bend[bar], morph_motion_bend(&s->motion, ends[bar][e], from, to));
+        }
+    if (bend[0] + bend[1] > spare) return false;
+    const morph_swept_options options = {distance + bend[0] + bend[1], true};
+    return !morph_swept_edge_edge((const double(*)[3])x[0][0], (const double(*)[3])x[0][1],
+                                  (const double(*)[3])x[1][0], (const double(*)[3])x[1][1], &options, NULL);
 }
 
 static morph_status bars_create(const morph_record *r, bars *s) {
@@ -185,25 +208,23 @@ static morph_status search(bars *s, const morph_control *control, double h, morp
     morph_finding *m = &f->kind[MORPH_MARGIN_SELF_CLEARANCE];
     const morph_record *r = s->r;
     /* Slack 1e-4 spacings as for the target; the budget too is out of any plan's reach. */
-    morph_sweep w = {pair_value,
-                     pair_travel,
-                     s,
-                     1e-4 * r->spacing,
-                     1e-9 * r->spacing,
-                     INFINITY,
-                     0,
-                     r->samples,
-                     0,
-                     3000000 + 50000L * s->count,
-                     false,
-                     false};
+    morph_sweep w = {.value = pair_value,
+                     .travel = pair_travel,
+                     .apart = f->plain ? NULL : pair_apart,
+                     .worth = WORTH,
+                     .data = s,
+                     .slack = 1e-4 * r->spacing,
+                     .tie = 1e-9 * r->spacing,
+                     .least = INFINITY,
+                     .finest = r->samples,
+                     .budget = 3000000 + 50000L * s->count};
     start_values(s, &w, m);
     if (!m->tested) return MORPH_OK;
     const double last = r->samples - 1;
     const int stretches = r->samples - 1 < STRETCHES ? r->samples - 1 : STRETCHES;
     for (int i = 0; i < stretches; i++) {
         const morph_status status =
-            search_stretch(s, &w, last * i / stretches, last * (i + 1) / stretches, m);
+            search_stretch(s, &w, floor(last * i / stretches), floor(last * (i + 1) / stretches), m);
         if (status != MORPH_OK) return status;
         if (w.failed) return MORPH_ERR_NONFINITE;
         if (w.exhausted) {
@@ -214,6 +235,8 @@ static morph_status search(bars *s, const morph_control *control, double h, morp
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
         morph_progress(control, "check", 0.7 + 0.3 * (i + 1) / stretches);
     }
+    f->evaluations += w.evaluations;
+    f->proofs += w.proofs;
     m->worst = w.least;
     m->time = w.at * h;
     return MORPH_OK;
