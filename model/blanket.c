@@ -159,6 +159,7 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
     const double least = LEAST_STEP * fmin(b->good_step, b->def.frame / first);
     int now = first;
     b->most_move = MOST_MOVE * b->structure->spacing;
+    b->guard.refused = 0;
     bool good = advance(b, now, at->allowed);
     while (!good && b->status == MORPH_OK && b->def.frame / now > least && now < MOST_STEPS / 2) {
         now *= 2;
@@ -283,6 +284,8 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
     report->short_of = -b->lift;
     note_worst(report, &v);
     report->rest_speed = frame_speed(b);
+    report->guarded = b->guard.steps;
+    report->crossings = b->guard.crossings;
     return MORPH_OK;
 }
 

@@ -55,6 +55,7 @@ typedef struct morph_blanket_def {
      * with the blanket and left as the last frame has it. Contact is both ways; recorded frames are polished
      * against its surface of that moment. */
     morph_body *body;
+    bool unguarded; /* no swept guard after long steps: for comparison */
 } morph_blanket_def;
 
 /* Owned arrays; zeroed is empty. */
@@ -76,7 +77,8 @@ typedef enum morph_blanket_limit {
 
 typedef struct morph_blanket_report {
     int steps, step_halvings;
-    double step; /* s */
+    int guarded, crossings; /* steps that the swept guard looked at; those that it refused */
+    double step;            /* s */
     bool at_rest;
     double rest_speed; /* m/s, fastest joint at the end */
     /* Worst violation over the recorded frames (m, relative, sine, m); 0 if none. */

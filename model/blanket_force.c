@@ -259,6 +259,7 @@ static bool drift(morph_blanket_state *b) {
     if (b->status != MORPH_OK) return false;
     morph_blanket_list_limits(b, b->x, moved, false);
     morph_blanket_find_contacts(b, b->x);
+    if (b->guard.watched > 0) morph_blanket_guard_contacts(b);
     morph_blanket_project_start(b, b->x, WARM);
     for (int sweep = 0; sweep < MORPH_BLANKET_SWEEPS; sweep++) {
         if (sweep == MORPH_BLANKET_SWEEPS / 2) morph_blanket_renew_contacts(b, b->x);
@@ -266,6 +267,7 @@ static bool drift(morph_blanket_state *b) {
         if (b->changed <= MORPH_BLANKET_SWEPT * b->structure->spacing) break;
     }
     morph_blanket_keep_contacts(b);
+    if (!morph_blanket_guard(b)) return false;
     if (b->soft) morph_blanket_soft_moved(b);
     b->path += take_velocity(b) + fabs(b->lift_to - b->lift);
     b->work += step_work(b);

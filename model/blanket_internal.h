@@ -84,6 +84,16 @@ typedef struct morph_violation {
     int link, tuple;  /* where length and angle are worst */
 } morph_violation;
 
+/* The swept guard (blanket_swept.c). */
+enum { MORPH_BLANKET_WATCHED = 64 };
+typedef struct morph_guard {
+    int steps, crossings;             /* looked at; refused, in all */
+    int refused;                      /* in this frame */
+    int watch[MORPH_BLANKET_WATCHED]; /* elements that were crossed: links, then skin triangles */
+    int watched;
+    bool known, blind; /* the field does not feel parts of the target */
+} morph_guard;
+
 typedef struct morph_blanket_fix morph_blanket_fix;
 typedef struct morph_blanket_self morph_blanket_self;
 typedef struct morph_blanket_soft morph_blanket_soft;
@@ -125,8 +135,9 @@ typedef struct morph_blanket_state {
     morph_blanket_soft *soft; /* the deformable target; NULL: none */
     morph_status status;      /* why a step failed, where not for its size */
     double *spare_x;          /* 3*joints */
-    bool entered;             /* the last frame had to be brought out of the target by exact distances */
-    morph_memo *memo;         /* links, then skin triangles */
+    morph_guard guard;
+    bool entered;     /* the last frame had to be brought out of the target by exact distances */
+    morph_memo *memo; /* links, then skin triangles */
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
@@ -235,6 +246,13 @@ void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */
 /* Returns the longest motion that the correction gives a joint, m. */
 double morph_blanket_project_contact(morph_contact *c, double *x, double friction);
+
+/* blanket_swept.c: false if axes of links or the skin passed through the target in the step from `before` to
+ * x: it is to be done again shorter, and those elements are watched from then on. Costs a look at how far
+ * joints moved, unless that is further than a radius. */
+bool morph_blanket_guard(morph_blanket_state *b);
+/* After find_contacts: adds contacts by exact distances at `before` for the elements watched. */
+void morph_blanket_guard_contacts(morph_blanket_state *b);
 
 /* blanket_body.c: the deformable target. All but create and destroy need b->soft. */
 morph_status morph_blanket_soft_create(morph_blanket_state *b); /* does nothing without def.body */

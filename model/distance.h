@@ -40,6 +40,11 @@ void morph_distance_segment(const morph_distance *d, const double a[3], const do
 void morph_distance_triangle(const morph_distance *d, const double a[3], const double b[3], const double c[3],
                              double weight[3], morph_closest *out);
 
+/* Triangles whose boxes meet the box lo .. hi, in the tree's order. Returns the count; the first `capacity`
+ * of them are written. */
+int morph_distance_box(const morph_distance *d, const double lo[3], const double hi[3], int *triangle,
+                       int capacity);
+
 /* Generalised winding number at p. */
 double morph_winding(const morph_distance *d, const double p[3]);
 bool morph_inside(const morph_distance *d, const double p[3]);
