@@ -155,6 +155,10 @@ static int steps_for_speed(const morph_blanket_state *b, int steps) {
  * far outside its limits) gains speed at any step: then the frame stands as it is, but its speed does not. */
 static morph_status next_frame(morph_blanket_state *b, const frame_start *at, int *steps,
                                morph_blanket_report *report) {
+    if (b->guard.watched == 0 && b->guard.usual > 0) {
+        *steps = b->guard.usual;
+        b->guard.usual = 0;
+    }
     const int first = steps_for_speed(b, *steps);
     const double least = LEAST_STEP * fmin(b->good_step, b->def.frame / first);
     int now = first;
@@ -167,7 +171,11 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
         rewind_frame(b, at);
         good = advance(b, now, at->allowed);
     }
-    if (good && now > first) *steps = now;
+    /* What the guard refused is kept while it watches, and no longer. */
+    if (good && now > first) {
+        if (b->guard.refused > 0 && b->guard.usual == 0) b->guard.usual = *steps;
+        *steps = now;
+    }
     if (b->status != MORPH_OK) return b->status;
     if (!good) {
         now = first;

@@ -91,6 +91,7 @@ typedef struct morph_guard {
     int refused;                      /* in this frame */
     int watch[MORPH_BLANKET_WATCHED]; /* elements that were crossed: links, then skin triangles */
     int watched;
+    int usual;         /* steps of a frame before it refused some; 0: none kept */
     bool known, blind; /* the field does not feel parts of the target */
 } morph_guard;
 
