@@ -28,6 +28,8 @@ typedef struct checker {
 #define COVERED 0.25
 /* Of the spacing: a round top loses less to a disc of two spacings than this, a post loses its height. */
 #define BUMP 0.5
+/* Of the spacing: sums with the ball's radius round to less, and nothing so shallow is a hole. */
+#define NOISE 1e-9
 /* No target asks for slopes beyond this, links that may vanish or not: keeps lambda finite in use. */
 #define STEEPEST 1e3
 
@@ -146,8 +148,9 @@ static void check_length(checker *c) {
 }
 
 /* Straight lines: between two neighbouring columns of cells all lines take the plan of the one that climbs
- * most there. */
-static void add_straight(checker *c) {
+ * most there. Where that is more than links reach, only shear brings the lines across. */
+static void check_straight(checker *c) {
+    morph_reach_item *length = &c->out->item[MORPH_REACH_LENGTH];
     for (int axis = 0; axis < 2; axis++) {
         double sum = 0.0;
         profile p = {&c->relief, axis, 0};
@@ -158,6 +161,8 @@ static void add_straight(checker *c) {
             sum += most;
         }
         c->out->straight[axis] = sum;
+        if (sum > c->out->reach[axis] && length->verdict == MORPH_REACH_WITHIN)
+            length->verdict = MORPH_REACH_NOTE;
     }
 }
 
@@ -222,7 +227,7 @@ static void check_holes(checker *c, double *lost) {
             const double deep = distance_below(r, r->closed, i, j, r->closed[at] - r->top[at]);
             below_ball += deep > near;
             below += fmax(deep, distance_below(r, r->over, i, j, r->over[at] - r->top[at])) > near;
-            if (!(deep > hole->number)) continue;
+            if (!(deep > hole->number) || deep < NOISE * c->s->spacing) continue;
             hole->number = deep;
             place_worst(c, MORPH_REACH_HOLE, 0, i, j);
         }
@@ -349,7 +354,7 @@ static morph_status check_all(checker *c, double frame) {
     morph_reach_item *hidden = &out->item[MORPH_REACH_HIDDEN];
     double lost;
     check_length(c);
-    add_straight(c);
+    check_straight(c);
     check_area(c);
     check_holes(c, &lost);
     check_stretch(c);
