@@ -8,8 +8,9 @@
 typedef struct ability {
     double shortest, longest; /* of a link of the bottom layer, m */
     double lambda, slope;
-    double ball; /* least radius of the sheet bent inwards, m */
-    double bend; /* largest angle from link to link, radians; NaN without posts */
+    double shear; /* m */
+    double ball;  /* least radius of the sheet bent inwards, m */
+    double bend;  /* largest angle from link to link, radians; NaN without posts */
     int links[2];
 } ability;
 
@@ -40,17 +41,19 @@ const char *morph_reach_name(morph_reach_kind kind) {
     return k >= 0 && k < MORPH_REACH_KINDS ? names[k] : "unknown";
 }
 
-/* Inward bend. Two layers, a post's length t apart, over the same arc of angle w: the outer is R w long, the
- * inner (R - t) w. With one at its longest and the other at its shortest, R / (R - t) = q = longest bottom /
- * shortest top, so R = t q / (q - 1). The angle limits add: links of length l turn by at most b at each post,
- * so l <= 2 R sin(b / 2). b: each of two neighbouring links leaves at most 90 degrees less its limit. */
+/* Inward bend: on the floor of a hole lies at least one shortest link of the upper layer, and beside it
+ * stand, off both walls, posts of length t: the hole is shortest + 2 t wide, a ball of half that radius fits.
+ * The angle limits add: links of length l turn by at most b at each post, so l <= 2 R sin(b / 2). b: each of
+ * two neighbouring links leaves at most 90 degrees less its limit. Shear: where one line climbs and its
+ * neighbour does not, their nodes draw apart until the links between them, at their longest, reach the least
+ * angle a to the lines: by longest cos a. So much a line has free on each side of what it climbs. */
 static ability ability_of(const morph_structure *s) {
     const morph_structure_def *d = &s->def;
     ability a = {.shortest = d->length[MORPH_LINK_BOTTOM][0], .longest = d->length[MORPH_LINK_BOTTOM][1]};
     a.lambda = a.longest / a.shortest;
     a.slope = fmin(sqrt(a.lambda * a.lambda - 1.0), STEEPEST);
-    const double q = a.longest / d->length[MORPH_LINK_TOP][0];
-    a.ball = q > 1.0 ? d->thickness * q / (q - 1.0) : INFINITY;
+    a.shear = fmax(a.longest * cos(d->link_link[0]), 0.0);
+    a.ball = 0.5 * d->length[MORPH_LINK_TOP][0] + d->thickness;
     a.bend = NAN;
     if (s->posts > 0) {
         const double pi = acos(-1.0);
@@ -76,6 +79,12 @@ static void place_worst(const checker *c, morph_reach_kind kind, int axis, int i
     morph_heights_point(&c->relief, i, j, item->at);
     item->along_y = axis == 1;
     item->line = next_line(c, axis, item->at);
+}
+
+/* What is lost by less than the estimate knows is worth a note. */
+static morph_reach_verdict verdict_of(bool beyond, double lost) {
+    if (!beyond) return MORPH_REACH_WITHIN;
+    return lost > MORPH_REACH_LOST ? MORPH_REACH_OUT : MORPH_REACH_NOTE;
 }
 
 /* A profile: the cells of one row of the grid along an axis. */
@@ -125,7 +134,6 @@ static int most_covered(const profile *p, int first, int last, double reach) {
 static void check_length(checker *c) {
     morph_reach_item *item = &c->out->item[MORPH_REACH_LENGTH];
     double worst = -1.0;
-    item->verdict = MORPH_REACH_WITHIN;
     for (int axis = 0; axis < 2; axis++) {
         const double reach = c->out->reach[axis] = c->can.links[axis] * c->can.longest;
         profile p = {&c->relief, axis, 0};
@@ -144,7 +152,7 @@ static void check_length(checker *c) {
         }
         item->lost = fmax(item->lost, 1.0 - (double)covered / c->relief.exposed);
     }
-    if (worst > 1.0) item->verdict = MORPH_REACH_OUT;
+    item->verdict = verdict_of(worst > 1.0, item->lost);
 }
 
 /* Straight lines: between two neighbouring columns of cells all lines take the plan of the one that climbs
@@ -197,7 +205,7 @@ static void check_area(checker *c) {
     item->lost = 1.0 - (double)covered / n;
     for (int k = 0; k < 3; k++)
         item->at[k] = c->out->item[MORPH_REACH_LENGTH].at[k];
-    item->verdict = item->number > item->limit ? MORPH_REACH_OUT : MORPH_REACH_WITHIN;
+    item->verdict = verdict_of(item->number > item->limit, item->lost);
 }
 
 /* Height of one surface over another as a distance to the upper one: across its slope. */
@@ -206,11 +214,6 @@ static double distance_below(const morph_heights *r, const double *upper, int i,
     const double zx = (upper[at + 1] - upper[at - 1]) / (2.0 * r->cell[0]);
     const double zy = (upper[at + row] - upper[at - row]) / (2.0 * r->cell[1]);
     return height / sqrt(1.0 + zx * zx + zy * zy);
-}
-
-static morph_reach_verdict verdict_of(bool beyond, double lost) {
-    if (!beyond) return MORPH_REACH_WITHIN;
-    return lost > MORPH_REACH_LOST ? MORPH_REACH_OUT : MORPH_REACH_NOTE;
 }
 
 /* What stays uncovered below the ball, and below the sheet altogether: the rest of it is due to slopes. */
@@ -378,7 +381,8 @@ morph_status morph_reach_check(const morph_structure *structure, const morph_dis
     for (int k = 0; k < MORPH_REACH_KINDS; k++)
         out->item[k].limit = NAN;
     morph_status status =
-        morph_heights_create(target, base, structure->spacing, c.can.ball, c.can.slope, &c.relief);
+        morph_heights_create(target, base, structure->spacing,
+                             &(morph_heights_limits){c.can.ball, c.can.slope, c.can.shear}, &c.relief);
     if (status != MORPH_OK) return status;
     out->cell = fmax(c.relief.cell[0], c.relief.cell[1]);
     out->cells = c.relief.n[0] * c.relief.n[1];

@@ -3,14 +3,15 @@
  *
  * The target is seen as its upper surface H(x, y), heights of the first hits from above on a grid of cells,
  * the base plane elsewhere. Over it lies the least surface that the sheet could take:
- *   1. holes, grooves and concave edges are closed by a ball as small as the sheet can bend inwards;
- *   2. where a side is steeper than links can follow, the sheet leaves it: along x and along y no slope above
- *      sqrt(lambda^2 - 1), lambda = longest / shortest length of a link. (Nodes keep their plan distance a
- *      from the next line's. A link on the flat needs a >= shortest, one on the slope a sec <= longest.)
+ *   1. holes, grooves and concave edges are closed by a ball as small as two layers can bend inwards;
+ *   2. where a side is steeper than links can follow, the sheet leaves it: along x and along y it falls by at
+ *      most sqrt(lambda^2 - 1) D + longest cos(least angle of neighbouring links) over a plan distance D,
+ *      lambda = longest / shortest length of a link. (Beside a line that climbs lies one that does not: its
+ *      nodes are a >= shortest apart, those of the first a sec <= longest; the rest is shear.)
  * What is seen from above and lies farther than a quarter of the spacing below that surface cannot be
  * covered, by the same rule that measures coverage. The border is free: nodes slide inwards, so a line may
- * spend all its links on the target, but no more. All of it is a bound for sheets whose grid lines stay near
- * vertical planes; shear can pass it by a little, dynamics and folds can fall short of it. */
+ * spend all its links on the target, but no more. All of it is an estimate for sheets whose grid lines stay
+ * near vertical planes, and on the generous side; dynamics and folds can fall short of it. */
 #ifndef MORPH_REACH_H
 #define MORPH_REACH_H
 

@@ -149,10 +149,12 @@ static morph_status close_by_ball(morph_heights *r, double radius, double *scrat
 }
 
 /* Least function above `closed` whose slope along each axis is at most `slope`: the upper envelope of cones
- * |dx| + |dy| over all cells, exact by one sweep to and fro along each axis. */
-static void limit_slope(morph_heights *r, double slope) {
+ * |dx| + |dy| over all cells, exact by one sweep to and fro along each axis. A line of arc lambda D + shear
+ * over the plan D falls by sqrt((lambda D + shear)^2 - D^2), which is no less than slope D + shear: the
+ * envelope is lowered by that, but not below `closed`. */
+static void limit_slope(morph_heights *r, const morph_heights_limits *limits) {
     const int nx = r->n[0], ny = r->n[1];
-    const double fall[2] = {slope * r->cell[0], slope * r->cell[1]};
+    const double fall[2] = {limits->slope * r->cell[0], limits->slope * r->cell[1]};
     double *z = r->over;
     memcpy(z, r->closed, (size_t)nx * (size_t)ny * sizeof *z);
     for (int j = 0; j < ny; j++) {
@@ -170,13 +172,15 @@ static void limit_slope(morph_heights *r, double slope) {
             z[morph_heights_at(r, i, j)] =
                 fmax(z[morph_heights_at(r, i, j)], z[morph_heights_at(r, i, j + 1)] - fall[1]);
     }
+    for (size_t k = 0; k < (size_t)nx * (size_t)ny; k++)
+        z[k] = fmax(z[k] - limits->shear, r->closed[k]);
 }
 
-morph_status morph_heights_create(const morph_distance *target, double base, double spacing, double ball,
-                                  double slope, morph_heights *r) {
+morph_status morph_heights_create(const morph_distance *target, double base, double spacing,
+                                  const morph_heights_limits *limits, morph_heights *r) {
     double lo[3], hi[3];
     *r = (morph_heights){0};
-    lay_grid(morph_distance_mesh(target), spacing, fmax(ball, spacing), lo, hi, r);
+    lay_grid(morph_distance_mesh(target), spacing, fmax(limits->ball, spacing), lo, hi, r);
     if (!isfinite(lo[2]) || !isfinite(hi[2] - lo[2])) return MORPH_ERR_NONFINITE;
     r->floor = isnan(base) ? lo[2] : base;
     const size_t cells = (size_t)r->n[0] * (size_t)r->n[1];
@@ -186,9 +190,9 @@ morph_status morph_heights_create(const morph_distance *target, double base, dou
     r->over = morph_alloc(cells, sizeof *r->over);
     morph_status status = r->top && r->seen && r->closed && r->over ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) status = look_down(target, spacing, r);
-    if (status == MORPH_OK) status = close_by_ball(r, ball, r->over);
+    if (status == MORPH_OK) status = close_by_ball(r, limits->ball, r->over);
     if (status == MORPH_OK)
-        limit_slope(r, slope);
+        limit_slope(r, limits);
     else
         morph_heights_free(r);
     return status;

@@ -17,9 +17,13 @@ typedef struct morph_heights {
     double hidden; /* share of the surface below other surface */
 } morph_heights;
 
-/* ball: radius of the ball that closes; slope: largest along x and y. */
-morph_status morph_heights_create(const morph_distance *target, double base, double spacing, double ball,
-                                  double slope, morph_heights *out);
+typedef struct morph_heights_limits {
+    double ball;  /* radius of the ball that closes, m */
+    double slope; /* largest along x and y */
+    double shear; /* what a line may fall beyond that, m */
+} morph_heights_limits;
+morph_status morph_heights_create(const morph_distance *target, double base, double spacing,
+                                  const morph_heights_limits *limits, morph_heights *out);
 void morph_heights_free(morph_heights *r);
 
 /* What is left of the top once level parts in which no disc of this radius fits are taken away; `out`: one

@@ -77,7 +77,8 @@ static void say_place(FILE *out, const morph_reach_item *item, morph_reach_kind 
 
 /* A line that is short enough by itself, but not beside its neighbours. */
 static void say_straight(FILE *out, const morph_reach *reach, morph_reach_kind kind) {
-    if (kind != MORPH_REACH_LENGTH || reach->item[kind].verdict != MORPH_REACH_NOTE) return;
+    const morph_reach_item *item = &reach->item[(int)kind];
+    if (kind != MORPH_REACH_LENGTH || item->verdict != MORPH_REACH_NOTE || item->number > item->limit) return;
     fprintf(out, "; straight lines would need %.3g m along x, %.3g m along y: only shear helps",
             reach->straight[0], reach->straight[1]);
 }
