@@ -155,25 +155,6 @@ static void check_length(checker *c) {
     item->verdict = verdict_of(worst > 1.0, item->lost);
 }
 
-/* Straight lines: between two neighbouring columns of cells all lines take the plan of the one that climbs
- * most there. Where that is more than links reach, only shear brings the lines across. */
-static void check_straight(checker *c) {
-    morph_reach_item *length = &c->out->item[MORPH_REACH_LENGTH];
-    for (int axis = 0; axis < 2; axis++) {
-        double sum = 0.0;
-        profile p = {&c->relief, axis, 0};
-        for (int k = 0; k < c->relief.n[axis]; k++) {
-            double most = 0.0;
-            for (p.across = 0; p.across < c->relief.n[1 - axis]; p.across++)
-                if (c->relief.seen[cell_of(&p, k)]) most = fmax(most, step_of(&p, c->relief.over, k));
-            sum += most;
-        }
-        c->out->straight[axis] = sum;
-        if (sum > c->out->reach[axis] && length->verdict == MORPH_REACH_WITHIN)
-            length->verdict = MORPH_REACH_NOTE;
-    }
-}
-
 static int compare_numbers(const void *pa, const void *pb) {
     const double a = *(const double *)pa, b = *(const double *)pb;
     return (a > b) - (a < b);
@@ -266,7 +247,8 @@ static void check_stretch(checker *c) {
     item->verdict = verdict_of(item->number > item->limit, item->lost);
 }
 
-/* Ridges of the sheet's surface: the angle between chords as long in plan as a shortest link. */
+/* Ridges of the sheet's surface: the angle between chords as long in plan as a shortest link, all of them on
+ * the target: over its rim the sheet leaves as it likes. */
 static void check_bend(checker *c) {
     morph_reach_item *item = &c->out->item[MORPH_REACH_BEND];
     item->limit = c->can.bend;
@@ -279,7 +261,9 @@ static void check_bend(checker *c) {
         for (p.across = 0; p.across < c->relief.n[1 - axis]; p.across++)
             for (int k = cells; k + cells < n; k++) {
                 const size_t at = cell_of(&p, k);
-                if (!c->relief.seen[at]) continue;
+                if (!c->relief.seen[at] || !c->relief.seen[cell_of(&p, k - cells)] ||
+                    !c->relief.seen[cell_of(&p, k + cells)])
+                    continue;
                 const double bend = atan((z[at] - z[cell_of(&p, k - cells)]) / plan) +
                                     atan((z[at] - z[cell_of(&p, k + cells)]) / plan);
                 if (!(bend > item->number)) continue;
@@ -357,7 +341,6 @@ static morph_status check_all(checker *c, double frame) {
     morph_reach_item *hidden = &out->item[MORPH_REACH_HIDDEN];
     double lost;
     check_length(c);
-    check_straight(c);
     check_area(c);
     check_holes(c, &lost);
     check_stretch(c);

@@ -52,10 +52,6 @@ typedef struct morph_reach {
     morph_reach_item item[MORPH_REACH_KINDS];
     /* No sheet covers a larger share of the exposed area, 0..1: length, area, holes and slopes together. */
     double coverage;
-    /* Length of a line along x, along y if all lines stay straight, so that each place costs as much as it
-     * does on the line that climbs most there, m. Within reach, no shear is needed; beyond, `length` is a
-     * note. */
-    double straight[2];
     double reach[2]; /* most that a line along x, along y reaches, m */
     double cell;     /* of the height grid, m: the larger side */
     int cells;

@@ -38,10 +38,11 @@ static void note_accuracy(planner *p) {
     s->sdf_max = p->work.accuracy.max;
 }
 
-/* Every finding of the reach check, one line each. */
+/* Findings of the reach check, one line each; a ridge that the sheet rounds off is left to `info`. */
 static void note_reach(const planner *p) {
     char line[400];
     for (int k = 0; k < MORPH_REACH_KINDS && p->options->warn; k++) {
+        if (k == MORPH_REACH_BEND) continue;
         morph_reach_sentence(&p->plan->summary.reach, (morph_reach_kind)k, line, sizeof line);
         if (line[0]) p->options->warn(p->options->control ? p->options->control->user : NULL, line);
     }

@@ -75,14 +75,6 @@ static void say_place(FILE *out, const morph_reach_item *item, morph_reach_kind 
     fprintf(out, ")");
 }
 
-/* A line that is short enough by itself, but not beside its neighbours. */
-static void say_straight(FILE *out, const morph_reach *reach, morph_reach_kind kind) {
-    const morph_reach_item *item = &reach->item[(int)kind];
-    if (kind != MORPH_REACH_LENGTH || item->verdict != MORPH_REACH_NOTE || item->number > item->limit) return;
-    fprintf(out, "; straight lines would need %.3g m along x, %.3g m along y: only shear helps",
-            reach->straight[0], reach->straight[1]);
-}
-
 static void say_lost(FILE *out, const morph_reach_item *item) {
     if (item->lost >= 5e-4)
         fprintf(out, ": %.3g %% of what is seen from above stays uncovered", 100.0 * item->lost);
@@ -98,7 +90,6 @@ void morph_reach_lines(FILE *out, const morph_reach *reach) {
                 verdicts[(int)item->verdict]);
         say_numbers(out, item, (morph_reach_kind)k);
         say_place(out, item, (morph_reach_kind)k);
-        say_straight(out, reach, (morph_reach_kind)k);
         say_lost(out, item);
         fprintf(out, "\n");
         head = "          ";
@@ -117,7 +108,6 @@ void morph_reach_sentence(const morph_reach *reach, morph_reach_kind kind, char 
             morph_reach_name(kind));
     say_numbers(out, item, kind);
     say_place(out, item, kind);
-    say_straight(out, reach, kind);
     say_lost(out, item);
     fclose(out);
     if (size > 0) text[size - 1] = '\0';

@@ -167,8 +167,6 @@ static void put_reach(builder *b, cJSON *root, const morph_reach *reach) {
     cJSON *object = put_object(b, root, "reach");
     put_bool(b, object, "within", reach->within);
     put_number(b, object, "coverage", reach->coverage);
-    put_number(b, object, "straight_x", reach->straight[0]);
-    put_number(b, object, "straight_y", reach->straight[1]);
     for (int k = 0; k < MORPH_REACH_KINDS; k++) {
         const morph_reach_item *item = &reach->item[k];
         if (item->verdict == MORPH_REACH_UNTESTED) continue;

@@ -112,6 +112,12 @@ function build(   k, a, bowl, w) {
     turned(points, 48)
 }'
 
+make dish_bore 'Round dish: rim of radius 0.22 at 0.17, a bore of radius 0.10 and 0.13 deep' '
+function build() {
+    point(0, 0); point(0.22, 0); point(0.22, 0.17); point(0.10, 0.17); point(0.09, 0.04); point(0, 0.04)
+    turned(points, 48)
+}'
+
 make step 'Two levels, 0.09 and 0.18, on 0.40 x 0.36' '
 function build() {
     corner(-0.20, 0); corner(0.20, 0); corner(0.20, 0.09); corner(0, 0.09); corner(0, 0.18); corner(-0.20, 0.18)
