@@ -5,6 +5,7 @@
 #include "planner/morphplan.h"
 #include "planner/picture.h"
 #include "planner/plan.h"
+#include "planner/reach_text.h"
 #include "planner/text.h"
 
 #include <errno.h>
@@ -172,7 +173,7 @@ static int plan_into(const morph_scene *scene, const char *folder, const morph_j
     const morph_control control = {job->stop, job->progress, job->log, job->user};
     const morph_plan_options options = {
         job->method && strcmp(job->method, "blanket") == 0 ? MORPH_METHOD_BLANKET : MORPH_METHOD_IPOPT,
-        &control};
+        &control, job->warning};
     char message[512] = "";
     morph_status status = morph_folder_probe(folder, job->overwrite, message, sizeof message);
     if (status != MORPH_OK) {
@@ -277,11 +278,17 @@ int morph_info_scene(const char *path, const morph_job *job, char **text) {
     const int code = read_scene(path, job, &scene);
     if (code != MORPH_EXIT_DONE) return code;
     morph_structure *s = NULL;
+    morph_distance *exact = NULL;
     morph_mobility mobility;
+    morph_reach reach;
     morph_blas_threads(1);
     morph_status status = morph_structure_create(&scene->structure, &s);
     if (status == MORPH_OK) status = morph_mobility_at(s, s->start, &mobility);
-    if (status == MORPH_OK && text) *text = morph_info_text(scene, s, &mobility);
+    if (status == MORPH_OK)
+        status = morph_distance_create(&scene->target, scene->target_report.closed, &exact);
+    if (status == MORPH_OK) status = morph_scene_reach(scene, s, exact, &reach);
+    if (status == MORPH_OK && text) *text = morph_info_text(scene, s, &mobility, &reach);
+    morph_distance_destroy(exact);
     morph_structure_destroy(s);
     morph_scene_destroy(scene);
     return status == MORPH_OK ? MORPH_EXIT_DONE : fail(job, path, status);

@@ -36,7 +36,8 @@ typedef struct morph_job {
     void (*message)(void *user, const char *line);                    /* faults and warnings, one line each */
     void (*log)(void *user, const char *line);                        /* what the solvers do, one line each */
     void (*progress)(void *user, const char *stage, double fraction); /* fraction of that stage */
-    int (*stop)(void *user); /* nonzero: stop soon with the best so far */
+    void (*warning)(void *user, const char *line); /* what a target asks beyond reach, one line each */
+    int (*stop)(void *user);                       /* nonzero: stop soon with the best so far */
     void *user;
 } morph_job;
 

@@ -1,4 +1,5 @@
 #include "planner/plan.h"
+#include "planner/reach_text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,11 +38,24 @@ static void note_accuracy(planner *p) {
     s->sdf_max = p->work.accuracy.max;
 }
 
+/* Findings of the reach check, one line each; a ridge that the sheet rounds off is left to `info`. */
+static void note_reach(const planner *p) {
+    char line[400];
+    for (int k = 0; k < MORPH_REACH_KINDS && p->options->warn; k++) {
+        if (k == MORPH_REACH_BEND) continue;
+        morph_reach_sentence(&p->plan->summary.reach, (morph_reach_kind)k, line, sizeof line);
+        if (line[0]) p->options->warn(p->options->control ? p->options->control->user : NULL, line);
+    }
+}
+
 static morph_status stage_target(planner *p) {
     const double since = morph_seconds();
     morph_progress(control_of(p), "target", 0.0);
     morph_status status = morph_workspace_create(p->scene, control_of(p), &p->work);
+    if (status == MORPH_OK)
+        status = morph_scene_reach(p->scene, p->work.structure, p->work.exact, &p->plan->summary.reach);
     if (status == MORPH_OK) {
+        note_reach(p);
         note_accuracy(p);
         status =
             morph_record_structure(&p->plan->record, p->work.structure, &p->scene->target, p->scene->base);

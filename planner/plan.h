@@ -14,6 +14,8 @@ typedef enum morph_method { MORPH_METHOD_IPOPT, MORPH_METHOD_BLANKET } morph_met
 typedef struct morph_plan_options {
     morph_method method;
     const morph_control *control;
+    void (*warn)(void *user,
+                 const char *line); /* the reach check's findings, with the control's user; NULL */
 } morph_plan_options;
 
 typedef struct morph_plan {
@@ -43,6 +45,8 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
 morph_status morph_workspace_press(morph_workspace *w, const morph_scene *scene, const morph_mesh *surface,
                                    const morph_control *control);
 void morph_workspace_free(morph_workspace *w);
+/* Height of the bottom layer at the start, m. */
+double morph_scene_start_height(const morph_scene *scene);
 /* What drives the pure blanket; points into scene and structure. */
 morph_blanket_def morph_scene_blanket(const morph_scene *scene, const morph_structure *structure);
 

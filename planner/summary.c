@@ -3,6 +3,7 @@
 
 #include "planner/folder.h"
 #include "planner/folder_text.h"
+#include "planner/reach_text.h"
 
 #include <cjson/cJSON.h>
 #include <stdlib.h>
@@ -161,6 +162,28 @@ static void put_seconds(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, root, "peak_memory_bytes", (double)s->peak_memory_bytes);
 }
 
+/* What the target asks against what the structure can give. */
+static void put_reach(builder *b, cJSON *root, const morph_reach *reach) {
+    cJSON *object = put_object(b, root, "reach");
+    put_bool(b, object, "within", reach->within);
+    put_number(b, object, "coverage", reach->coverage);
+    for (int k = 0; k < MORPH_REACH_KINDS; k++) {
+        const morph_reach_item *item = &reach->item[k];
+        if (item->verdict == MORPH_REACH_UNTESTED) continue;
+        cJSON *at = put_object(b, object, morph_reach_name((morph_reach_kind)k));
+        put_text(b, at, "verdict", morph_reach_verdict_name(item->verdict));
+        put_number(b, at, "number", item->number);
+        put_number(b, at, "limit", item->limit);
+        put_text(b, at, "unit", morph_reach_unit((morph_reach_kind)k));
+        put_number(b, at, "lost", item->lost);
+        put_text(b, at, "along", item->along_y ? "y" : "x");
+        put_number(b, at, "line", item->line);
+        put_number(b, at, "x", item->at[0]);
+        put_number(b, at, "y", item->at[1]);
+        put_number(b, at, "z", item->at[2]);
+    }
+}
+
 static void put_deformable(builder *b, cJSON *root, const morph_deformable_report *r) {
     if (!r->used) {
         keep(b, cJSON_AddNullToObject(root, "deformable"));
@@ -208,6 +231,7 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_text(b, root, "reason", s->reason);
     put_number(b, root, "spacing", s->spacing);
     put_measures(b, root, s);
+    put_reach(b, root, &s->reach);
     put_deformable(b, root, &s->deformable);
     put_margins(b, root, s);
     put_replay(b, root, "replay", &s->replay);

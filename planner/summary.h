@@ -4,6 +4,7 @@
 
 #include "model/blanket.h"
 #include "model/cavity.h"
+#include "model/reach.h"
 #include "planner/check.h"
 #include "planner/replay.h"
 #include "planner/target_body.h"
@@ -30,6 +31,7 @@ typedef struct morph_summary {
     bool has_plan, has_blanket;
     morph_measure blanket, plan;
     double target_volume;
+    morph_reach reach; /* what the target asks of the structure, before anything is solved */
     double spacing;
     morph_check_report check;
     int free_motions, redundant;

@@ -1,5 +1,7 @@
 #include "planner/text.h"
 
+#include "planner/reach_text.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -160,7 +162,8 @@ static void target_lines(FILE *out, const morph_mesh_report *t) {
             t->welded, t->degenerate, t->flipped, t->boundary_edges, t->self_intersections, t->components);
 }
 
-char *morph_info_text(const morph_scene *scene, const morph_structure *s, const morph_mobility *m) {
+char *morph_info_text(const morph_scene *scene, const morph_structure *s, const morph_mobility *m,
+                      const morph_reach *reach) {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
@@ -170,6 +173,7 @@ char *morph_info_text(const morph_scene *scene, const morph_structure *s, const 
     limit_lines(out, s);
     mobility_lines(out, s, m);
     target_lines(out, &scene->target_report);
+    morph_reach_lines(out, reach);
     fprintf(out, "size       %d unknowns for a pose\nlinks      number, nodes (i,j) at both ends, layer\n",
             3 * s->joints);
     for (int l = 0; l < s->links; l++) {

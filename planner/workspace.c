@@ -20,10 +20,10 @@ static void field_box(const morph_scene *scene, const morph_structure *s, const 
     if (!isnan(scene->base)) lo[2] = fmax(lo[2], scene->base - 0.5 * a);
 }
 
-/* Of the bottom layer. Dropped, it starts above the target, and never in the base plane: with a target below
+/* Dropped, it starts above the target, and never in the base plane: with a target below
  * that the plane counts as the top. Where the target rises, it starts in the frame that holds it: on the base
  * plane, or without one where the target's top begins, by a radius and a contact's margin above either. */
-static double start_height(const morph_scene *scene) {
+double morph_scene_start_height(const morph_scene *scene) {
     const double top = scene->target_report.hi[2], base = isnan(scene->base) ? -INFINITY : scene->base;
     if (scene->motion.mode == MORPH_MODE_DROP) return fmax(top, base) + scene->motion.height;
     return fmax(top - scene->motion.height, base) + scene->structure.radius + 2e-3 * scene->structure.spacing;
@@ -39,7 +39,7 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
     if (status == MORPH_OK && !(w->start = morph_alloc(3 * (size_t)s->joints, sizeof(double))))
         status = MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
-        const double height = start_height(scene);
+        const double height = morph_scene_start_height(scene);
         for (int i = 0; i < 3 * s->joints; i++)
             w->start[i] = s->start[i] + (i % 3 == 2 ? height : 0.0);
     }

@@ -293,6 +293,7 @@ static morph_job make_job(const arguments *a, screen *s) {
     if (a->method) job.method = a->method;
     job.overwrite = a->overwrite;
     job.message = on_message;
+    if (!a->quiet) job.warning = on_message;
     job.log = on_log;
     job.progress = on_progress;
     job.stop = ask_stop;
