@@ -194,6 +194,7 @@ static void curve(int nodes, bool sphere) {
 int main(int argc, char **argv) {
     static const int sizes[] = {4, 8, 12, 16};
     const int count = argc > 1 ? argc - 1 : 4;
+    setvbuf(stdout, NULL, _IOLBF, 0);
     morph_blas_threads(1);
     if (argc == 3 && strcmp(argv[1], "line") == 0) {
         const int nodes = atoi(argv[2]);
