@@ -20,6 +20,9 @@ enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 
 #define CLEAR 1e-5
 /* Penalties grow where an update leaves more than a quarter of a violation, to at most this. */
 #define MOST_PENALTY 1e5
+/* Forces that grow by less than this in a step do not keep the next step from growing: a part that falls
+ * freely, or swings down, has the same force left over all the way, give or take a little. */
+#define STEADY 1.02
 /* Kick that leaves a balanced but unstable shape, in spacings. */
 #define KICK 2e-3
 
@@ -152,7 +155,8 @@ static void next_drag(morph_settle *s, bool good, double move, double residual, 
         s->drag *= 2.0;
     else if (residual < 0.5 * last && move < 0.25 * MOST_MOVE)
         s->drag = fmax(LEAST_DRAG, s->drag / 8.0);
-    else if (residual <= last && move < 0.5 * MOST_MOVE)
+    else if ((residual <= last && move < 0.5 * MOST_MOVE) ||
+             (residual <= STEADY * last && move < 0.25 * MOST_MOVE))
         s->drag = fmax(LEAST_DRAG, s->drag / 2.0);
 }
 

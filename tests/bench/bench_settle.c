@@ -1,9 +1,12 @@
 /* Settle against the blanket's dynamics on the same scenes: bench_settle [NODES...].
  *
- * For a box and a sphere under grids of 4 x 4, 8 x 8 and 16 x 16 (springs of 20 N/m, friction 0.4, the target
- * scaled with the grid as in examples/scenes): seconds of both, their ratio, the mean gap and the potential
- * energy of both ends, Newton iterations, factorisations, analyses, the linear solver's share; then settle
- * from the dynamics' end, and warm from its own.
+ * For a box and a sphere under grids of 4 x 4, 8 x 8, 12 x 12 and 16 x 16 (springs of 20 N/m, the target
+ * scaled with the grid as in examples/scenes): with friction 0.4, seconds of both, their ratio, the mean gap
+ * and the potential energy of both ends, Newton iterations, factorisations, analyses, the linear solver's
+ * share; then settle from the dynamics' end, and warm from its own. Without friction and with two centres, as
+ * placement uses it: cold, then warm after one centre has moved by a twentieth of the spacing, back again,
+ * after its strength has grown by a tenth, and cold with the same centres. "line NODES" prints the energy
+ * along a line of 41 places of a centre instead, each from the rest before it.
  */
 #include "model/blanket.h"
 #include "model/cavity.h"
@@ -117,18 +120,99 @@ static void compare(scene *s) {
     morph_settle_destroy(settle);
 }
 
+/* Two centres a little inside the target, off its middle, each pulling a joint by its weight at most. */
+static void centres(int nodes, morph_attractor c[2]) {
+    const double width = 0.1 * (nodes - 1), weight = 0.02 * 9.81;
+    const double strength = weight * 0.1 * 0.1 * 1.5 * sqrt(3.0);
+    c[0] = (morph_attractor){{-0.15 * width, 0.02, 0.05 * width}, strength};
+    c[1] = (morph_attractor){{0.2 * width, -0.1 * width, 0.05 * width}, strength};
+}
+
+static morph_settle *without_friction(const scene *s, const morph_attractor c[2]) {
+    morph_settle_def sd = morph_settle_defaults();
+    morph_settle *settle = NULL;
+    sd.base = 0.0;
+    sd.attractor = c;
+    sd.attractors = 2;
+    return morph_settle_create(s->structure, s->sdf, &sd, &settle) == MORPH_OK ? settle : NULL;
+}
+
+static void placement_line(const char *name, scene *s, morph_settle *settle, bool warm) {
+    morph_settle_report r = {0};
+    const morph_status status = morph_settle_run(settle, s->x, warm, NULL, &r);
+    printf("  %-14s %8.3f s  energy %.6f J  %s%s%s: %d steps, %d iterations, residual %.1e weights\n", name,
+           r.seconds, r.energy, status == MORPH_OK ? "" : morph_status_text(status),
+           r.converged ? "converged" : "NOT converged", r.stable ? ", stable" : "", r.steps, r.iterations,
+           r.residual);
+}
+
+static void placement(scene *s, int nodes) {
+    morph_attractor c[2];
+    centres(nodes, c);
+    morph_settle *settle = without_friction(s, c);
+    if (!settle) return;
+    printf(" no friction, two centres\n");
+    memcpy(s->x, s->start, s->bytes);
+    placement_line("cold", s, settle, false);
+    c[0].at[0] += 0.05 * s->structure->spacing;
+    if (morph_settle_attract(settle, c) == MORPH_OK) placement_line("warm, moved", s, settle, true);
+    c[0].at[0] -= 0.05 * s->structure->spacing;
+    if (morph_settle_attract(settle, c) == MORPH_OK) placement_line("warm, back", s, settle, true);
+    c[0].strength *= 1.1;
+    if (morph_settle_attract(settle, c) == MORPH_OK) placement_line("warm, stronger", s, settle, true);
+    memcpy(s->x, s->start, s->bytes);
+    placement_line("cold, stronger", s, settle, false);
+    morph_settle_destroy(settle);
+}
+
+/* The energy along a line, and how far each value is from the straight one between its neighbours. */
+static void curve(int nodes, bool sphere) {
+    enum { POINTS = 41 };
+    double energy[POINTS];
+    scene s;
+    morph_attractor c[2];
+    centres(nodes, c);
+    printf("%s, %d x %d: energy along a line of a centre, J\n", sphere ? "sphere" : "box", nodes, nodes);
+    morph_settle *settle = make(&s, nodes, sphere) ? without_friction(&s, c) : NULL;
+    if (settle) memcpy(s.x, s.start, s.bytes);
+    for (int k = 0; settle && k < POINTS; k++) {
+        morph_settle_report r = {0};
+        if (morph_settle_attract(settle, c) != MORPH_OK ||
+            morph_settle_run(settle, s.x, k > 0, NULL, &r) != MORPH_OK)
+            break;
+        energy[k] = r.energy;
+        printf("  %.4f m  %.6f J  %s, %.3f s", c[0].at[0], r.energy,
+               r.converged ? "converged" : "NOT converged", r.seconds);
+        if (k > 1) printf(", bend %.1e", energy[k] - 2.0 * energy[k - 1] + energy[k - 2]);
+        printf("\n");
+        c[0].at[0] += 0.05 * s.structure->spacing;
+    }
+    morph_settle_destroy(settle);
+    discard(&s);
+}
+
 int main(int argc, char **argv) {
-    static const int sizes[] = {4, 8, 16};
-    const int count = argc > 1 ? argc - 1 : 3;
+    static const int sizes[] = {4, 8, 12, 16};
+    const int count = argc > 1 ? argc - 1 : 4;
+    setvbuf(stdout, NULL, _IOLBF, 0);
     morph_blas_threads(1);
+    if (argc == 3 && strcmp(argv[1], "line") == 0) {
+        const int nodes = atoi(argv[2]);
+        if (nodes < 2) return 2;
+        for (int sphere = 0; sphere < 2; sphere++)
+            curve(nodes, sphere != 0);
+        return 0;
+    }
     for (int k = 0; k < count; k++)
         for (int sphere = 0; sphere < 2; sphere++) {
             const int nodes = argc > 1 ? atoi(argv[k + 1]) : sizes[k];
             scene s;
             printf("%s, %d x %d\n", sphere ? "sphere" : "box", nodes, nodes);
-            if (nodes >= 2 && make(&s, nodes, sphere != 0))
+            if (nodes >= 2 && make(&s, nodes, sphere != 0)) {
+
                 compare(&s);
-            else
+                placement(&s, nodes);
+            } else
                 printf("  cannot be made\n");
             discard(&s);
             fflush(stdout);
