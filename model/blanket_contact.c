@@ -5,8 +5,12 @@
 
 /* Contacts aim this much outside, as the other limits do (blanket_project.c). */
 #define CONTACT_MARGIN 1e-3 /* spacings */
-/* Places closer than this beyond a step's motion are listed: corrections within a step stay below it. */
-#define NEAR 0.05 /* spacings */
+/* Places that no step brings closer than this, spacings, are not looked at; elements further away than it are
+ * not by exact distances. */
+#define NEAR 0.05
+/* Places closer than this beyond their motion in a step are listed: what sweeps may add to it, as for the
+ * other limits. */
+#define LISTED 0.02 /* spacings */
 /* The smooth distance has a slope near 1, less where edges are rounded; a flatter gradient than this is no
  * direction to trust with a full correction. */
 #define LEAST_SLOPE 0.3
@@ -57,6 +61,11 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     b->hold = morph_alloc(most + (size_t)s->joints, sizeof *b->hold);
     b->spare_touch = morph_alloc(most, sizeof *b->spare_touch);
     b->memo = morph_alloc((size_t)(s->links + s->skin_triangles), sizeof *b->memo);
+    b->touch_wake = morph_alloc(most, sizeof *b->touch_wake);
+    b->hot_contact = morph_alloc(most + (size_t)s->joints, sizeof *b->hot_contact);
+    b->held = morph_alloc(most + (size_t)s->joints, sizeof *b->held);
+    b->spare_wake = morph_alloc(most, sizeof *b->spare_wake);
+    if (!b->touch_wake || !b->hot_contact || !b->held || !b->spare_wake) return MORPH_ERR_NOMEM;
     if (!b->touch || !b->contact || !b->hold || !b->spare_touch || !b->memo) return MORPH_ERR_NOMEM;
     if (!b->sdf) return MORPH_OK;
     for (int j = 0; j < s->joints; j++)
@@ -111,14 +120,6 @@ static double distance_of(const morph_blanket_state *b, morph_touch *t, const do
     }
     if (g) memcpy(g, t->gradient, sizeof t->gradient);
     return t->phi + morph_dot(t->gradient, d);
-}
-
-static double extent_of(const morph_touch *t, const double *x) {
-    double extent = 0.0;
-    for (int j = 0; j < t->corners; j++)
-        for (int k = 0; k < j; k++)
-            extent = fmax(extent, morph_dist(&x[3 * t->joint[j]], &x[3 * t->joint[k]]));
-    return extent;
 }
 
 /* One round of a compass search in the weights: the place moves a stride towards the corner that brings it
@@ -213,23 +214,41 @@ static bool swept(const morph_blanket_state *b, morph_contact *c, const double *
     return false;
 }
 
+/* How far the place is from where it would have to be listed, at least: by its last distance and what it has
+ * moved since; negative where that cannot tell. */
+static double spare_since(const morph_blanket_state *b, const morph_touch *t, const double q[3],
+                          double listed) {
+    const double p[3] = {q[0], q[1], q[2] - b->lift_to};
+    return t->known ? (t->phi - t->radius - listed) / MOST_SLOPE - morph_dist(p, t->at) : -1.0;
+}
+
+/* A seeking place looks around when the joints have moved by an eighth of its distance: what comes nearer to
+ * its element than to it has come no further than to a quarter of that, by the distance's slope. */
+static void sleep_until(morph_blanket_state *b, const morph_touch *t, double spare, double move) {
+    b->touch_wake[t - b->touch] = b->path - move + spare;
+}
+
 static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double move) {
-    if (b->path + move < t->wake) return;
-    double q[3];
+    const double listed = LISTED * b->structure->spacing, lift = fabs(b->lift_to - b->lift);
+    double q[3], from[3];
     place_of(x, t->joint, t->corners, t->weight, q);
+    place_of(b->before, t->joint, t->corners, t->weight, from);
+    const double own = listed + morph_dist(q, from) + lift;
+    if (t->stride == 0.0 && spare_since(b, t, q, own) > 0.0) return;
     const bool moved = has_moved(b, t, q);
     double gap = distance_of(b, t, q, NULL) - t->radius;
     const double near = NEAR * b->structure->spacing + move;
-    const double reach = t->stride > 0.0 ? extent_of(t, x) : 0.0;
-    const double spare = gap / MOST_SLOPE - reach - near;
-    if (spare > 0.0) {
-        t->wake = b->path - move + spare;
+    if (t->stride == 0.0 && gap / MOST_SLOPE > near) {
+        sleep_until(b, t, gap / MOST_SLOPE - near, move);
         return;
     }
     /* What rests has found its deepest place; exact distances look after it from frame to frame. */
     if (t->stride > SHORTEST_STRIDE || (t->stride > 0.0 && moved))
         gap = seek(b, t, x, gap + t->radius) - t->radius;
-    if (gap > near) return;
+    if (gap > own) {
+        if (t->stride > 0.0) sleep_until(b, t, (gap - listed) / 8.0, 0.0);
+        return;
+    }
     morph_contact *c = add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
     if (swept(b, c, x, t->radius) || set_plane(b, c, x, t->radius)) b->contacts++;
 }
@@ -249,13 +268,14 @@ static void find_base(morph_blanket_state *b, const double *x, double move) {
 }
 
 void morph_blanket_forget(morph_blanket_state *b) {
-    for (int t = 0; t < b->touches; t++)
-        b->touch[t].wake = 0.0;
     for (int t = 0; t < b->angles; t++)
-        b->angle[t].push[0] = b->angle[t].push[1] = b->angle[t].wake = 0.0;
+        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+    memset(b->touch_wake, 0, (size_t)b->touches * sizeof *b->touch_wake);
+    memset(b->angle_wake, 0, (size_t)b->angles * sizeof *b->angle_wake);
     memset(b->link_wake, 0, (size_t)b->links * sizeof *b->link_wake);
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
+    b->holds = 0;
     morph_blanket_self_forget(b->self);
     if (b->soft) morph_blanket_soft_forget(b);
 }
@@ -275,7 +295,7 @@ void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
     const double move = b->moved + fabs(b->lift_to - b->lift);
     b->contacts = 0;
     for (int t = 0; t < b->touches; t++)
-        find_target(b, &b->touch[t], x, move);
+        if (!(b->path + move < b->touch_wake[t])) find_target(b, &b->touch[t], x, move);
     if (!isnan(b->def.base)) find_base(b, x, move);
     if (b->soft) morph_blanket_soft_find(b, x, NEAR * b->structure->spacing + move);
 }
@@ -311,11 +331,12 @@ static void set_drag(morph_contact *c, const double want[3], double friction, do
 /* The place's centre q moves by weight_j times what joint j moves; joints move by weight_j times push, so q
  * by push / inverse. Normal: unilateral. Friction: undo the tangential motion since the step's start, by at
  * most friction times the normal push (Coulomb; sticking inside the cone, sliding on it). */
-double morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
+double morph_blanket_project_contact(morph_contact *c, double *x, double friction, double *gap_out) {
     double q[3], change[3], want[3];
     place_of(x, c->joint, c->corners, c->weight, q);
     const double gap = morph_dot(c->normal, q) - c->level;
     const double old = c->push;
+    if (gap_out) *gap_out = gap;
     c->push = fmax(0.0, old - gap * c->inverse);
     if (c->push == 0.0 && old == 0.0) return 0.0;
     for (int k = 0; k < 3; k++) {
@@ -344,9 +365,13 @@ void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm
 }
 
 void morph_blanket_keep_contacts(morph_blanket_state *b) {
-    memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
+    for (int k = 0; k < b->holds; k++)
+        b->hold[b->held[k]] = (morph_hold){0};
+    b->holds = 0;
     for (int n = 0; n < b->contacts; n++) {
         const morph_contact *c = &b->contact[n];
+        if (c->push == 0.0) continue;
+        b->held[b->holds++] = c->source;
         b->hold[c->source].push = c->push;
         memcpy(b->hold[c->source].drag, c->drag, sizeof c->drag);
     }
@@ -364,7 +389,7 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
     double depth = base_depth(b, x);
     for (int k = 0; k < b->touches; k++) {
         const morph_touch *t = &b->touch[k];
-        if (b->path < t->wake) continue;
+        if (b->path < b->touch_wake[k]) continue;
         double q[3];
         place_of(x, t->joint, t->corners, t->weight, q);
         depth = fmax(depth, t->radius - distance_at(b, q, NULL));
@@ -372,16 +397,7 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
     return depth;
 }
 
-/* Corners of an element as the target sees them; its exact distance less the radius, where it is nearest. */
-static double exact_gap(const morph_blanket_state *b, const double v[3][3], int corners, double radius,
-                        double weight[3], morph_closest *at) {
-    if (corners == 2)
-        morph_distance_segment(b->exact, v[0], v[1], weight, at);
-    else
-        morph_distance_triangle(b->exact, v[0], v[1], v[2], weight, at);
-    return at->distance - radius;
-}
-
+/* Corners of an element as the target sees them. */
 static void place_element(const morph_blanket_state *b, const double *x, const int *joint, int corners,
                           double v[3][3]) {
     for (int k = 0; k < corners; k++) {
@@ -403,22 +419,48 @@ static element element_of(const morph_structure *s, int n) {
     return (element){s->link[n], 2, s->link_radius[n], s->link_kind[n] != MORPH_LINK_BOTTOM};
 }
 
+/* Exact distance of an element from where its deepest place was last time. Beyond NEAR nobody asks how far.
+ */
+static void measure(const morph_blanket_state *b, const element *e, const double v[3][3], morph_memo *memo) {
+    const double enough = e->radius + 1.01 * NEAR * b->structure->spacing;
+    double sum = 0.0, weight[3];
+    morph_closest at;
+    for (int k = 0; k < e->corners; k++)
+        sum += memo->weight[k];
+    for (int k = 0; k < 3; k++)
+        weight[k] = k >= e->corners ? 0.0 : sum > 0.5 ? memo->weight[k] : 1.0 / e->corners;
+    morph_distance_element(b->exact, v, e->corners, enough, weight, &at);
+    memcpy(memo->weight, weight, sizeof weight);
+    memcpy(memo->normal, at.normal, sizeof memo->normal);
+    memcpy(memo->point, at.point, sizeof memo->point);
+    memcpy(memo->corner, v, sizeof memo->corner);
+    memo->gap = at.distance - e->radius;
+    memo->bounded = at.triangle < 0;
+    memo->known = memo->fresh = true;
+}
+
+static double moved_since(const morph_memo *memo, const double v[3][3], int corners) {
+    double moved = 0.0;
+    for (int k = 0; k < corners; k++)
+        moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
+    return moved;
+}
+
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
+    const double allowed = 0.5 * MORPH_BLANKET_CLEARANCE_HELD * s->spacing;
     double depth = base_depth(b, x);
     for (int n = 0; n < s->links + s->skin_triangles; n++) {
         const element e = element_of(s, n);
         if (!e.tested) continue;
         morph_memo *memo = &b->memo[n];
-        double v[3][3], moved = 0.0;
-        morph_closest at;
+        double v[3][3] = {{0.0}};
         place_element(b, x, e.joint, e.corners, v);
-        for (int k = 0; k < e.corners && memo->known; k++)
-            moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
-        if (memo->known && memo->gap - moved >= 0.0) continue;
-        memo->gap = exact_gap(b, v, e.corners, e.radius, memo->weight, &at);
-        memo->known = memo->fresh = true;
-        memcpy(memo->corner, v, sizeof v);
+        const double bound =
+            memo->known ? memo->gap - moved_since(memo, (const double(*)[3])v, e.corners) : -INFINITY;
+        depth = fmax(depth, bound >= -allowed ? -bound : 0.0);
+        if (bound >= -allowed) continue;
+        measure(b, &e, (const double(*)[3])v, memo);
         depth = fmax(depth, -memo->gap);
     }
     return depth;
@@ -430,7 +472,7 @@ void morph_blanket_seek_deepest(morph_blanket_state *b) {
         morph_memo *memo = &b->memo[n];
         if (!memo->fresh) continue;
         memo->fresh = false;
-        if (memo->gap > NEAR * s->spacing) continue;
+        if (memo->bounded || memo->gap > NEAR * s->spacing) continue;
         morph_touch *t = &b->touch[memo->touch];
         double q[3];
         place_of(b->x, t->joint, t->corners, t->weight, q);
@@ -440,33 +482,31 @@ void morph_blanket_seek_deepest(morph_blanket_state *b) {
             continue;
         memcpy(t->weight, memo->weight, sizeof t->weight);
         t->stride = SHORTEST_STRIDE;
-        t->wake = 0.0;
+        b->touch_wake[memo->touch] = 0.0;
     }
 }
 
-/* One contact at the deepest place of an element. */
-static void find_deepest(morph_blanket_state *b, const double *x, const element *e) {
-    double v[3][3], weight[3] = {0.0}, q[3];
-    morph_closest at;
-    place_element(b, x, e->joint, e->corners, v);
-    if (exact_gap(b, v, e->corners, e->radius, weight, &at) > NEAR * b->structure->spacing) return;
-    morph_contact *c = add_contact(b, e->joint, e->corners, weight, 0);
-    place_of(x, e->joint, e->corners, weight, q);
-    memcpy(c->normal, at.normal, sizeof c->normal);
-    c->level = morph_dot(c->normal, q) - at.distance + e->radius + CONTACT_MARGIN * b->structure->spacing;
+/* One contact at the deepest place of an element, as it was found when the element was last measured: what
+ * has moved since far enough to matter has just been measured again. */
+static void find_deepest(morph_blanket_state *b, const double *x, int n) {
+    const element e = element_of(b->structure, n);
+    const morph_memo *memo = &b->memo[n];
+    double v[3][3];
+    if (!e.tested || !memo->known || memo->bounded) return;
+    place_element(b, x, e.joint, e.corners, v);
+    if (memo->gap - moved_since(memo, (const double(*)[3])v, e.corners) > NEAR * b->structure->spacing)
+        return;
+    morph_contact *c = add_contact(b, e.joint, e.corners, memo->weight, 0);
+    memcpy(c->normal, memo->normal, sizeof c->normal);
+    c->level = morph_dot(c->normal, memo->point) + c->normal[2] * b->lift_to + e.radius +
+               CONTACT_MARGIN * b->structure->spacing;
     c->radius = -1.0; /* the plane stays */
     b->contacts++;
 }
 
 void morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
-    const morph_structure *s = b->structure;
     b->contacts = 0;
-    for (int n = 0; n < s->links + s->skin_triangles; n++) {
-        const element e = element_of(s, n);
-        const morph_memo *memo = &b->memo[n];
-        /* What is far by its last distance is far still. */
-        if (e.tested && !(memo->known && memo->gap > 2.0 * NEAR * b->structure->spacing))
-            find_deepest(b, x, &e);
-    }
+    for (int n = 0; n < b->structure->links + b->structure->skin_triangles; n++)
+        find_deepest(b, x, n);
     if (!isnan(b->def.base)) find_base(b, x, 0.0);
 }

@@ -263,7 +263,7 @@ static bool drift(morph_blanket_state *b) {
     morph_blanket_project_start(b, b->x, WARM);
     for (int sweep = 0; sweep < MORPH_BLANKET_SWEEPS; sweep++) {
         if (sweep == MORPH_BLANKET_SWEEPS / 2) morph_blanket_renew_contacts(b, b->x);
-        morph_blanket_sweep(b, b->x, (sweep & 1) != 0, b->def.friction);
+        morph_blanket_sweep(b, b->x, sweep, b->def.friction);
         if (b->changed <= MORPH_BLANKET_SWEPT * b->structure->spacing) break;
     }
     morph_blanket_keep_contacts(b);

@@ -14,7 +14,6 @@ typedef struct morph_touch {
     int joint[3], corners;
     double weight[3];        /* barycentric */
     double radius;           /* m */
-    double wake;             /* path length (state.path) before which it cannot touch */
     double stride;           /* of the search for the deepest place on the element; 0: the place is fixed */
     double at[3];            /* where the target's distance was last taken, seen from the target */
     double phi, gradient[3]; /* that distance and its gradient */
@@ -50,7 +49,6 @@ typedef struct morph_angle {
     double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
     double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
-    double wake;            /* path length (state.path) before which it cannot reach a limit */
 } morph_angle;
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
@@ -69,9 +67,11 @@ typedef struct morph_angle {
 /* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
 typedef struct morph_memo {
     double corner[3][3], gap;
-    double weight[3];  /* of the deepest place */
-    int touch;         /* the place that seeks on it */
-    bool known, fresh; /* fresh: taken since the last morph_blanket_seek_deepest */
+    double weight[3];           /* of the deepest place */
+    double normal[3], point[3]; /* there: gradient of the distance, closest point of the target */
+    bool bounded;               /* gap is only a lower bound: all but corner and gap are not known */
+    int touch;                  /* the place that seeks on it */
+    bool known, fresh;          /* fresh: taken since the last morph_blanket_seek_deepest */
 } morph_memo;
 
 /* How far the state is from its limits; violations are >= 0. */
@@ -127,9 +127,15 @@ typedef struct morph_blanket_state {
     double (*bound)[2];      /* links: the limits that hold: the structure's, or the prescribed lengths */
     double (*limit)[2];      /* links: what the projection aims at, a little inside */
     double (*push)[2];       /* links: accumulated corrections of this step at the two limits */
-    double *link_wake;       /* links: path length before which it cannot reach a limit */
+    /* Path lengths before which a link or an angle cannot reach a limit, and a place cannot touch. */
+    double *link_wake, *angle_wake, *touch_wake;
     int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
     int near_links, near_angles;
+    /* Of them and of the contacts those that the last complete sweep found at work or nearly so. */
+    int *hot_link, *hot_angle, *hot_contact;
+    int hot_links, hot_angles, hot_contacts;
+    bool hot_backward; /* listed in a backward sweep */
+    double stirred;    /* largest motion by a correction in the last sweep, m */
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
     morph_blanket_self *self;
@@ -142,10 +148,12 @@ typedef struct morph_blanket_state {
     morph_touch *touch;
     morph_contact *contact; /* capacity: touches + joints */
     morph_hold *hold;       /* touches + joints */
+    int *held, holds;       /* sources whose hold is not 0 */
     /* Polishing a frame works on these copies' originals and puts them back. */
     double (*spare_push)[2];
     morph_angle *spare_angle;
     morph_touch *spare_touch;
+    double *spare_wake; /* touch_wake */
 } morph_blanket_state;
 
 /* sdf may be NULL (no target). Validates def; x0 is copied. */
@@ -188,8 +196,15 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double m
 /* Applies `warm` times the corrections of the last step to x (0: forgets them): at rest every step needs the
  * same ones, so that a few sweeps a step converge over many steps. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
-/* One pass over angles, lengths, contacts and posts of x; backward turns the order round. */
-void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
+/* Sweep number `sweep` over angles, lengths, contacts and posts of x, odd ones in reversed order. The first
+ * and every sixth after it are complete, and those after a sweep that moved more than what counts as nearly;
+ * the others look only at what the last complete one found at work or nearly so: four of five listed rows
+ * never are. */
+void morph_blanket_sweep(morph_blanket_state *b, double *x, int sweep, double friction);
+/* Sweeps over lengths and posts alone until all lengths are within their bounds: they aim inside, so that a
+ * few are enough where few lengths are beyond. Forgets the links' corrections. False where some still are,
+ * and at once where panels or prescribed lengths hang all together. */
+bool morph_blanket_sweep_lengths(morph_blanket_state *b, double *x);
 /* The panel's volume over the size of its gradient, a length, and the gradient of norm 1 by bottom and top of
  * either post. False where it has no direction. */
 bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
@@ -235,7 +250,7 @@ void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x);
 /* Deepest violation of a place's radius or the base plane at x, m, >= 0. */
 double morph_blanket_depth(const morph_blanket_state *b, const double *x);
 /* The same by exact distances over whole links and triangles. An element that has moved less than its last
- * distance left over is not measured again. */
+ * distance left over and half of what counts as held is not measured again: its bound counts. */
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
 /* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
  * between the fixed places is then felt by the steps that follow. */
@@ -245,8 +260,9 @@ void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
 /* Part of project_start; most: largest push to start with, m. */
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */
-/* Returns the longest motion that the correction gives a joint, m. */
-double morph_blanket_project_contact(morph_contact *c, double *x, double friction);
+/* Returns the longest motion that the correction gives a joint, m; *gap (may be NULL): to the half space
+ * before it, m. */
+double morph_blanket_project_contact(morph_contact *c, double *x, double friction, double *gap);
 
 /* blanket_swept.c: false if axes of links or the skin passed through the target in the step from `before` to
  * x: it is to be done again shorter, and those elements are watched from then on. Costs a look at how far

@@ -15,6 +15,8 @@
 #define ENTERED 0.1
 /* Rounds with contact by exact distances, which cost a tree search per element. */
 #define EXACT_ROUNDS 12
+/* Rounds that try equalities alone where no contact is broken. */
+#define ALONE 2
 /* Of lengths, posts, panels and angles at x. */
 static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
@@ -67,6 +69,11 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
         const double worst = (v.length + v.clearance) / spacing + v.post + v.panel;
         if (round >= LEAST_ROUNDS && worst > BETTER * before) return v;
         before = worst;
+        /* Lengths alone, as after most frames: the least motion that mends them. */
+        if (round < ALONE && v.clearance <= MORPH_BLANKET_CLEARANCE_HELD * spacing) {
+            if (!morph_blanket_sweep_lengths(b, x)) morph_blanket_fix_apply(b, x);
+            continue;
+        }
         if (exact)
             morph_blanket_find_exact(b, x);
         else
@@ -74,25 +81,28 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
         morph_blanket_list_limits(b, x, 0.0, true);
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)
-            morph_blanket_sweep(b, x, (sweep & 1) != 0, 0.0);
-        morph_blanket_fix_apply(b, x);
+            morph_blanket_sweep(b, x, sweep, 0.0);
+        if (!morph_blanket_sweep_lengths(b, x)) morph_blanket_fix_apply(b, x);
     }
 }
 
 morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     const size_t push = (size_t)b->links * sizeof *b->push, angle = (size_t)b->angles * sizeof *b->angle,
-                 touch = (size_t)b->touches * sizeof *b->touch;
+                 touch = (size_t)b->touches * sizeof *b->touch,
+                 wake = (size_t)b->touches * sizeof *b->touch_wake;
     memcpy(b->spare_push, b->push, push);
     memcpy(b->spare_angle, b->angle, angle);
     memcpy(b->spare_touch, b->touch, touch);
+    memcpy(b->spare_wake, b->touch_wake, wake);
     memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
     if (b->soft) morph_blanket_soft_hold(b);
-    morph_violation v = polish(b, x, false, ROUNDS);
-    if (b->exact && (b->sdf || b->soft)) v = polish(b, x, true, EXACT_ROUNDS);
+    const bool exact = b->exact && (b->sdf || b->soft);
+    const morph_violation v = polish(b, x, exact, exact ? EXACT_ROUNDS : ROUNDS);
     if (b->soft) morph_blanket_soft_release(b);
     memcpy(b->push, b->spare_push, push);
     memcpy(b->angle, b->spare_angle, angle);
     memcpy(b->touch, b->spare_touch, touch);
+    memcpy(b->touch_wake, b->spare_wake, wake);
     if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }

@@ -1,6 +1,8 @@
 /* Projections of the blanket: rigid posts, length limits, angle limits. */
 #include "model/blanket_internal.h"
 
+#include <string.h>
+
 /* The sweeps converge towards the limits from outside, so they aim a little inside: what is left after them
  * then still holds the true limits. Small against what a limit means (a link of 1 spacing has a range of 0.6,
  * an angle one of 80 degrees). */
@@ -9,6 +11,16 @@
 
 /* What sweeps may move a joint by beyond its step, spacings: limits closer than that are listed. */
 #define SWEEPS_ADD 0.02
+
+/* Rows closer to their limits than this are looked at in every sweep: what a sweep moves. */
+#define HOT_LENGTH 0.005 /* spacings */
+#define HOT_COSINE 0.01
+/* Every so many sweeps one is complete. */
+#define COMPLETE 6
+
+static double squared(double x) {
+    return x * x;
+}
 
 /* Weights of joints that one correction is taken to carry at rest, at most. */
 #define MOST_CARRIED 16.0
@@ -53,7 +65,11 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->link_wake = morph_alloc((size_t)b->links, sizeof *b->link_wake);
     b->near_link = morph_alloc((size_t)b->links, sizeof *b->near_link);
     b->near_angle = morph_alloc((size_t)b->angles, sizeof *b->near_angle);
-    if (!b->link_wake || !b->near_link || !b->near_angle) return MORPH_ERR_NOMEM;
+    b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
+    b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
+    b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
+    if (!b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake || !b->hot_link || !b->hot_angle)
+        return MORPH_ERR_NOMEM;
     if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
         return MORPH_ERR_NOMEM;
     for (int l = 0; l < b->links; l++) {
@@ -134,16 +150,23 @@ static double unilateral(double *push, double gap) {
     return *push - old;
 }
 
-static void project_length(morph_blanket_state *b, int l, double *x) {
+/* True if the next sweeps must look at it too. */
+static bool project_length(morph_blanket_state *b, int l, double *x) {
     const int *ends = b->structure->link[l];
-    double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], d[3];
+    const double *limit = b->limit[l];
+    double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], *push = b->push[l], d[3];
     morph_sub(xj, xi, d);
-    const double length = morph_norm(d);
-    if (!(length > 0.0)) return;
-    double grow = unilateral(&b->push[l][0], length - b->limit[l][0]);
-    if (b->push[l][0] == 0.0) grow -= unilateral(&b->push[l][1], b->limit[l][1] - length);
+    const double square = morph_dot(d, d);
+    const double hot = HOT_LENGTH * b->structure->spacing;
+    if (push[0] == 0.0 && push[1] == 0.0 && square > squared(limit[0]) && square < squared(limit[1]))
+        return square < squared(limit[0] + hot) || square > squared(fmax(0.0, limit[1] - hot));
+    const double length = sqrt(square);
+    if (!(length > 0.0)) return true;
+    double grow = unilateral(&push[0], length - limit[0]);
+    if (push[0] == 0.0) grow -= unilateral(&push[1], limit[1] - length);
     note(b, grow);
     if (grow != 0.0) part(b, ends, xi, xj, d, grow / length);
+    return true;
 }
 
 static void start_length(morph_blanket_state *b, int l, double *x, double warm, double most) {
@@ -173,11 +196,15 @@ static double cosine(const morph_angle *a, const double *x, double *c, double (*
     *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
     if (!grad || !(scale > 0.0)) return 0.0;
     *arm = sqrt(fmin(uu, vv));
-    double square = 0.0;
+    const double one = 1.0 / scale, cu = *c / uu, cv = *c / vv;
+    double square = 0.0, gu[3], gv[3];
+    for (int k = 0; k < 3; k++) {
+        gu[k] = v[k] * one - cu * u[k];
+        gv[k] = u[k] * one - cv * v[k];
+    }
     for (int j = 0; j < a->joints; j++) {
         for (int k = 0; k < 3; k++)
-            grad[j][k] = a->weight[j] * (a->su[j] * (v[k] / scale - *c * u[k] / uu) +
-                                         a->sv[j] * (u[k] / scale - *c * v[k] / vv));
+            grad[j][k] = a->weight[j] * (a->su[j] * gu[k] + a->sv[j] * gv[k]);
         square += morph_dot(grad[j], grad[j]);
     }
     return square * scale > 1e-12 ? square : 0.0;
@@ -208,7 +235,7 @@ static bool angle_near(const morph_blanket_state *b, morph_angle *a, const doubl
     if (!(scale > 0.0)) return true;
     const double c = morph_dot(u, v) / scale, gap = fmin(a->ceiling - c, c - a->floor);
     const double spare = gap * sqrt(fmin(uu, vv)) / (4.0 + 2.0 * fmax(gap, 0.0)) - near;
-    if (note && spare > 0.0) a->wake = b->path + spare;
+    if (note && spare > 0.0) b->angle_wake[a - b->angle] = b->path + spare;
     return !(spare > 0.0);
 }
 
@@ -234,8 +261,8 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double m
             b->push[l][0] = b->push[l][1] = 0.0;
     }
     for (int t = 0; t < b->angles; t++) {
+        if (!all && b->path + near < b->angle_wake[t]) continue;
         morph_angle *a = &b->angle[t];
-        if (!all && b->path + near < a->wake) continue;
         const double own = all ? add : add + own_move(b, x, a->joint, a->joints);
         if (angle_near(b, a, x, own, !all))
             b->near_angle[b->near_angles++] = t;
@@ -259,19 +286,35 @@ static void turn(const morph_angle *a, double *x, const double (*grad)[3], doubl
             x[3 * a->joint[j] + k] += change * grad[j][k];
 }
 
+/* Whether floor < cos(u, v) < ceiling, without root or division; false where it cannot be told so. */
+static bool cosine_within(const double u[3], const double v[3], double floor, double ceiling) {
+    const double dot = morph_dot(u, v), side = dot > 0.0 ? ceiling : floor;
+    if (!(ceiling > 0.0 && floor < 0.0)) return false;
+    return dot * dot < side * side * (morph_dot(u, u) * morph_dot(v, v));
+}
+
+static bool at_work(const morph_angle *a) {
+    return a->push[0] != 0.0 || a->push[1] != 0.0;
+}
+
 /* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
- * the shorter arm. */
-static double project_angle(morph_angle *a, double *x) {
-    double c, arm, grad[4][3];
-    cosine(a, x, &c, NULL, NULL);
-    if (c <= a->ceiling && c >= a->floor && a->push[0] == 0.0 && a->push[1] == 0.0) return 0.0;
+ * the shorter arm. *motion: longest by the correction. True if the next sweeps must look at it too. */
+static bool project_angle(morph_angle *a, double *x, double *motion) {
+    double c, arm, grad[4][3], u[3], v[3];
+    *motion = 0.0;
+    if (!at_work(a)) {
+        arms(a, x, u, v);
+        if (cosine_within(u, v, a->floor + HOT_COSINE, a->ceiling - HOT_COSINE)) return false;
+        if (cosine_within(u, v, a->floor, a->ceiling)) return true;
+    }
     const double square = cosine(a, x, &c, grad, &arm);
-    if (square == 0.0) return 0.0;
+    if (square == 0.0) return true;
     const double most = 0.5 * arm / sqrt(square);
     double change = unilateral(&a->push[0], clip((c - a->floor) / square, most));
     if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) / square, most));
     turn(a, x, (const double(*)[3])grad, change);
-    return change * sqrt(square);
+    *motion = change * sqrt(square);
+    return true;
 }
 
 static void start_angle(morph_angle *a, double *x, double warm, double most) {
@@ -360,22 +403,109 @@ void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm)
     project_posts(b, x);
 }
 
+/* All listed rows; lists those that are hot. */
+static void sweep_complete(morph_blanket_state *b, double *x, bool backward) {
+    double motion;
+    b->hot_angles = b->hot_links = b->hot_contacts = 0;
+    for (int t = 0; t < b->near_angles; t++) {
+        const int angle = b->near_angle[backward ? b->near_angles - 1 - t : t];
+        if (project_angle(&b->angle[angle], x, &motion)) b->hot_angle[b->hot_angles++] = angle;
+        note(b, motion);
+    }
+    for (int l = 0; l < b->near_links; l++) {
+        const int link = b->near_link[backward ? b->near_links - 1 - l : l];
+        if (project_length(b, link, x)) b->hot_link[b->hot_links++] = link;
+    }
+}
+
+/* Lists made in a backward sweep run the other way. */
+static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
+    double motion;
+    for (int t = 0; t < b->hot_angles; t++) {
+        project_angle(&b->angle[b->hot_angle[backward ? b->hot_angles - 1 - t : t]], x, &motion);
+        note(b, motion);
+    }
+    for (int l = 0; l < b->hot_links; l++)
+        project_length(b, b->hot_link[backward ? b->hot_links - 1 - l : l], x);
+}
+
+static void sweep_contacts(morph_blanket_state *b, double *x, bool complete, bool backward, double friction) {
+    const double hot = HOT_LENGTH * b->structure->spacing;
+    for (int n = 0; n < b->contacts && complete; n++) {
+        double gap;
+        const int contact = backward ? b->contacts - 1 - n : n;
+        note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, &gap));
+        if (gap < hot || b->contact[contact].push > 0.0) b->hot_contact[b->hot_contacts++] = contact;
+    }
+    for (int n = 0; n < b->hot_contacts && !complete; n++) {
+        const int contact = b->hot_contact[backward ? b->hot_contacts - 1 - n : n];
+        note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, NULL));
+    }
+}
+
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
  * angles yield where all cannot hold at once. */
-void morph_blanket_sweep(morph_blanket_state *b, double *x, bool backward, double friction) {
+void morph_blanket_sweep(morph_blanket_state *b, double *x, int sweep, double friction) {
+    const bool stirred = b->stirred > HOT_LENGTH * b->structure->spacing;
+    const bool backward = (sweep & 1) != 0, complete = sweep % COMPLETE == 0 || stirred;
     b->changed = 0.0;
-    for (int t = 0; t < b->near_angles; t++)
-        note(b, project_angle(&b->angle[b->near_angle[backward ? b->near_angles - 1 - t : t]], x));
-    for (int l = 0; l < b->near_links; l++)
-        project_length(b, b->near_link[backward ? b->near_links - 1 - l : l], x);
+    if (complete) {
+        sweep_complete(b, x, backward);
+        b->hot_backward = backward;
+    } else
+        sweep_hot(b, x, backward != b->hot_backward);
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
         project_panel(b, backward ? panels - 1 - p : p, x);
-    /* Panels hang together and a deformable target has sweeps of its own: neither is done early. */
-    if (panels > 0 || b->soft) b->changed = INFINITY;
     note(b, morph_blanket_project_self(b, x, backward));
-    for (int c = 0; c < b->contacts; c++)
-        note(b, morph_blanket_project_contact(&b->contact[backward ? b->contacts - 1 - c : c], x, friction));
+    sweep_contacts(b, x, complete, complete ? backward : backward != b->hot_backward, friction);
     if (b->soft) morph_blanket_soft_sweep(b, x, backward, friction);
     project_posts(b, x);
+    b->stirred = b->changed;
+    /* Panels hang together and a deformable target has sweeps of its own: neither is done early. */
+    if (panels > 0 || b->soft) b->changed = INFINITY;
+}
+
+/* Most sweeps over lengths and posts alone, and after how many it is asked whether they are done. */
+#define LENGTH_SWEEPS 48
+#define LENGTH_ASKED 4
+
+static bool within_bounds(const morph_blanket_state *b, int l, const double *x) {
+    const int *ends = b->structure->link[l];
+    const double length = morph_dist(&x[3 * ends[0]], &x[3 * ends[1]]);
+    return length >= b->bound[l][0] && length <= b->bound[l][1];
+}
+
+static bool lengths_hold(const morph_blanket_state *b, const double *x) {
+    for (int l = 0; l < b->links; l++)
+        if (!within_bounds(b, l, x)) return false;
+    return true;
+}
+
+/* Links that these sweeps may push: those at work and those no further inside than sweeps move them. */
+static void list_lengths(morph_blanket_state *b, const double *x) {
+    const double hot = HOT_LENGTH * b->structure->spacing;
+    b->near_links = 0;
+    for (int l = 0; l < b->links; l++) {
+        const int *ends = b->structure->link[l];
+        const double length = morph_dist(&x[3 * ends[0]], &x[3 * ends[1]]);
+        const bool near = length < b->limit[l][0] + hot || length > b->limit[l][1] - hot;
+        if (near || b->push[l][0] > 0.0 || b->push[l][1] > 0.0) b->near_link[b->near_links++] = l;
+    }
+}
+
+bool morph_blanket_sweep_lengths(morph_blanket_state *b, double *x) {
+    if (b->structure->panels > 0 || b->def.drive) return false;
+    memset(b->push, 0, (size_t)b->links * sizeof *b->push);
+    project_posts(b, x);
+    for (int sweep = 0; sweep < LENGTH_SWEEPS; sweep++) {
+        if (sweep % LENGTH_ASKED == 0) {
+            if (lengths_hold(b, x)) return true;
+            list_lengths(b, x);
+        }
+        for (int l = 0; l < b->near_links; l++)
+            project_length(b, b->near_link[sweep & 1 ? b->near_links - 1 - l : l], x);
+        project_posts(b, x);
+    }
+    return lengths_hold(b, x);
 }

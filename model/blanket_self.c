@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How much the boxes are grown, spacings: a joint moves so far in some ten steps of the usual motion. */
-#define MARGIN 0.1
+/* How much the boxes are grown, spacings: far pairs cost next to nothing. */
+#define MARGIN 0.25
+/* Pairs closer than this beyond what a step moves them are listed: what sweeps may add, spacings. */
+#define LISTED 0.05
 /* Aimed at beyond the sum of the radii, spacings, as the other limits aim inside. */
 #define AIM 1e-3
 
@@ -28,6 +30,7 @@ struct morph_blanket_self {
     double *radius;
     morph_box *box;
     int (*pair)[2];
+    double *pair_wake; /* path length before which the pair cannot meet */
     self_contact *contact;
     double wake; /* path length (state.path) from which the pairs must be found anew */
 };
@@ -59,6 +62,7 @@ void morph_blanket_self_destroy(morph_blanket_self *c) {
     free(c->radius);
     free(c->box);
     free(c->pair);
+    free(c->pair_wake);
     free(c->contact);
     free(c);
 }
@@ -75,10 +79,12 @@ static bool apart(const int a[2], const int b[2]) {
 static morph_status reserve(morph_blanket_self *c, int pairs) {
     if (pairs <= c->room) return MORPH_OK;
     free(c->pair);
+    free(c->pair_wake);
     free(c->contact);
     c->pair = morph_alloc((size_t)pairs * 2, sizeof *c->pair);
+    c->pair_wake = morph_alloc((size_t)pairs * 2, sizeof *c->pair_wake);
     c->contact = morph_alloc((size_t)pairs * 2, sizeof *c->contact);
-    c->room = c->pair && c->contact ? 2 * pairs : 0;
+    c->room = c->pair && c->pair_wake && c->contact ? 2 * pairs : 0;
     c->contacts = c->pairs = 0;
     return c->room > 0 ? MORPH_OK : MORPH_ERR_NOMEM;
 }
@@ -97,8 +103,10 @@ static morph_status find_pairs(morph_blanket_state *b, const double *x) {
     if (status != MORPH_OK) return status;
     c->pairs = 0;
     for (int k = 0; k < count; k++)
-        if (apart(c->bar[found[k][0]], c->bar[found[k][1]]))
+        if (apart(c->bar[found[k][0]], c->bar[found[k][1]])) {
+            c->pair_wake[c->pairs] = 0.0;
             memcpy(c->pair[c->pairs++], found[k], sizeof *c->pair);
+        }
     c->wake = b->path + margin;
     return MORPH_OK;
 }
@@ -106,7 +114,8 @@ static morph_status find_pairs(morph_blanket_state *b, const double *x) {
 /* The pair as a half space: with the bars' closest places and the direction between them at the step's start,
  * when they had not passed through each other, wherever they are now. Axes that met have no direction but
  * their common normal. */
-static bool set_contact(const morph_blanket_state *b, const int pair[2], double near, self_contact *out) {
+static bool set_contact(const morph_blanket_state *b, const int pair[2], double near, double *apart_by,
+                        self_contact *out) {
     const morph_blanket_self *c = b->self;
     const int *p = c->bar[pair[0]], *q = c->bar[pair[1]];
     const double *a0 = &b->before[3 * p[0]], *a1 = &b->before[3 * p[1]];
@@ -114,6 +123,7 @@ static bool set_contact(const morph_blanket_state *b, const int pair[2], double 
     double s, t, normal[3];
     const double least = c->radius[pair[0]] + c->radius[pair[1]] + AIM * b->structure->spacing;
     const double distance = morph_segment_segment(a0, a1, b0, b1, &s, &t);
+    *apart_by = distance - least;
     if (distance > least + near) return false;
     if (distance > 1e-6 * least) {
         for (int k = 0; k < 3; k++)
@@ -151,9 +161,14 @@ morph_status morph_blanket_find_self(morph_blanket_state *b, double move) {
         const morph_status status = find_pairs(b, b->before);
         if (status != MORPH_OK) return status;
     }
-    const double near = 2.0 * move + 0.5 * MARGIN * b->structure->spacing;
-    for (int k = 0; k < c->pairs; k++)
-        if (set_contact(b, c->pair[k], near, &c->contact[c->contacts])) c->contacts++;
+    const double still = 0.5 * LISTED * b->structure->spacing, near = 2.0 * move + 2.0 * still;
+    for (int k = 0; k < c->pairs; k++) {
+        double by = 0.0;
+        if (b->path + move < c->pair_wake[k]) continue;
+        if (set_contact(b, c->pair[k], near, &by, &c->contact[c->contacts])) c->contacts++;
+        /* Both bars move by the path at most: listed from where less than near is left. */
+        c->pair_wake[k] = b->path + 0.5 * by - still;
+    }
     return MORPH_OK;
 }
 

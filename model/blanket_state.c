@@ -95,6 +95,12 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->bound);
     free(b->limit);
     free(b->link_wake);
+    free(b->angle_wake);
+    free(b->touch_wake);
+    free(b->hot_link);
+    free(b->hot_angle);
+    free(b->hot_contact);
+    free(b->held);
     free(b->near_link);
     free(b->near_angle);
     free(b->push);
@@ -109,6 +115,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->spare_push);
     free(b->spare_angle);
     free(b->spare_touch);
+    free(b->spare_wake);
     free(b);
 }
 

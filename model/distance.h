@@ -45,6 +45,13 @@ void morph_distance_triangle(const morph_distance *d, const double a[3], const d
 int morph_distance_box(const morph_distance *d, const double lo[3], const double hi[3], int *triangle,
                        int capacity);
 
+/* The same for an element of 2 or 3 corners with a hint: weight holds on entry the weights of a place on it
+ * that may be near the nearest one (3 numbers, the unused 0). Where the least distance is beyond `enough` (m)
+ * it may only be bounded: out->triangle is -1 then, out->distance a lower bound of at least `enough`, and the
+ * weights are the hint's. */
+void morph_distance_element(const morph_distance *d, const double corner[][3], int corners, double enough,
+                            double weight[3], morph_closest *out);
+
 /* Generalised winding number at p. */
 double morph_winding(const morph_distance *d, const double p[3]);
 bool morph_inside(const morph_distance *d, const double p[3]);

@@ -399,3 +399,57 @@ void morph_distance_triangle(const morph_distance *d, const double a[3], const d
     element_distance(d, (const double(*)[3])corner, 3, w, out);
     memcpy(weight, w, sizeof w);
 }
+
+/* The element's nearest place is a corner, or what traverse finds: corners first, each no further than the
+ * best so far. False where one of them is inside. */
+static bool corners_clear(search *s) {
+    for (int j = 0; j < s->corners; j++) {
+        morph_nearest nearest = {.squared = s->best * s->best};
+        morph_closest c;
+        morph_tree_nearest(s->d, s->corner[j], -1, &nearest);
+        if (nearest.slot < 0) continue;
+        morph_nearest_finish(s->d, s->corner[j], &nearest, &c);
+        if (c.distance < 0) return false;
+        const double weight[3] = {j == 0, j == 1, j == 2};
+        note_distance(s, c.distance, weight);
+    }
+    return true;
+}
+
+/* Where one place of the element is outside a closed mesh and nothing crosses it, all of it is outside: the
+ * hint's distance bounds the search, and what is further than `enough` need not be found at all. Everything
+ * else is left to the search without a hint. */
+void morph_distance_element(const morph_distance *d, const double corner[][3], int corners, double enough,
+                            double weight[3], morph_closest *out) {
+    search s;
+    double hint[3], p[3];
+    memcpy(hint, weight, sizeof hint);
+    blend(corner, corners, hint, p);
+    morph_distance_point(d, p, out);
+    if (d->closed && out->distance > 0) {
+        const double bound = fmax(enough, 0.5 * out->distance);
+        start(&s, d, corner, corners);
+        s.best = fmin(bound, out->distance);
+        memcpy(s.weight, hint, sizeof hint);
+        const double from = s.best;
+        double reach = d->reach;
+        for (int k = 0; k < 3; k++)
+            reach = fmax(reach, fmax(fabs(s.lo[k]), fabs(s.hi[k])));
+        if (corners_clear(&s)) {
+            traverse(&s);
+            if (s.crossings == 0 && s.best > 16 * DBL_EPSILON * reach) {
+                memcpy(weight, s.weight, sizeof hint);
+                if (s.best < from) {
+                    blend(corner, corners, weight, p);
+                    morph_distance_point(d, p, out);
+                } else if (from < out->distance) {
+                    out->distance = from;
+                    out->triangle = -1;
+                }
+                return;
+            }
+        }
+    }
+    memset(weight, 0, 3 * sizeof *weight);
+    element_distance(d, corner, corners, weight, out);
+}

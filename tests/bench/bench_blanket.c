@@ -38,31 +38,21 @@ double __wrap_morph_attraction(const morph_attractor *a, double soft, const doub
     return __real_morph_attraction(a, soft, x, f, h);
 }
 
-void __real_morph_distance_segment(const morph_distance *d, const double a[3], const double b[3],
-                                   double weight[2], morph_closest *out);
-void __wrap_morph_distance_segment(const morph_distance *d, const double a[3], const double b[3],
-                                   double weight[2], morph_closest *out);
-void __wrap_morph_distance_segment(const morph_distance *d, const double a[3], const double b[3],
-                                   double weight[2], morph_closest *out) {
+void __real_morph_distance_element(const morph_distance *d, const double corner[][3], int corners,
+                                   double enough, double weight[3], morph_closest *out);
+void __wrap_morph_distance_element(const morph_distance *d, const double corner[][3], int corners,
+                                   double enough, double weight[3], morph_closest *out);
+void __wrap_morph_distance_element(const morph_distance *d, const double corner[][3], int corners,
+                                   double enough, double weight[3], morph_closest *out) {
     count.exact++;
-    __real_morph_distance_segment(d, a, b, weight, out);
+    __real_morph_distance_element(d, corner, corners, enough, weight, out);
 }
 
-void __real_morph_distance_triangle(const morph_distance *d, const double a[3], const double b[3],
-                                    const double c[3], double weight[3], morph_closest *out);
-void __wrap_morph_distance_triangle(const morph_distance *d, const double a[3], const double b[3],
-                                    const double c[3], double weight[3], morph_closest *out);
-void __wrap_morph_distance_triangle(const morph_distance *d, const double a[3], const double b[3],
-                                    const double c[3], double weight[3], morph_closest *out) {
-    count.exact++;
-    __real_morph_distance_triangle(d, a, b, c, weight, out);
-}
-
-void __real_morph_blanket_project_contact(morph_contact *c, double *x, double friction);
-void __wrap_morph_blanket_project_contact(morph_contact *c, double *x, double friction);
-void __wrap_morph_blanket_project_contact(morph_contact *c, double *x, double friction) {
+double __real_morph_blanket_project_contact(morph_contact *c, double *x, double friction, double *gap);
+double __wrap_morph_blanket_project_contact(morph_contact *c, double *x, double friction, double *gap);
+double __wrap_morph_blanket_project_contact(morph_contact *c, double *x, double friction, double *gap) {
     count.rows++;
-    __real_morph_blanket_project_contact(c, x, friction);
+    return __real_morph_blanket_project_contact(c, x, friction, gap);
 }
 
 morph_status __real_morph_sparse_factor(morph_sparse *s, const double *value, int *column);

@@ -228,11 +228,54 @@ static void test_segment_pairs(void **state) {
     }
 }
 
+/* With any hint: the same distance where it is no more than asked for, else a true lower bound beyond that.
+ */
+static void test_hinted_elements(void **state) {
+    (void)state;
+    const double radii[3] = {0.7, 0.5, 0.3}, enough = 0.15;
+    int bounded = 0, found = 0, inside = 0;
+    morph_mesh mesh = {0};
+    morph_distance *d;
+    assert_int_equal(morph_mesh_ellipsoid(radii, 0.01, &mesh), MORPH_OK);
+    assert_int_equal(morph_distance_create(&mesh, true, &d), MORPH_OK);
+    for (int trial = 0; trial < 1200; trial++) {
+        double corner[3][3], middle[3], w[3] = {0.0}, hint[3] = {0.0};
+        const int n = 2 + trial % 2;
+        morph_closest exact, hinted;
+        random_point(-0.9, 0.9, middle);
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++)
+                corner[j][k] = middle[k] + uniform(-0.1, 0.1);
+        hint[trial % n] = 0.75;
+        hint[(trial + 1) % n] = 0.25;
+        if (n == 2)
+            morph_distance_segment(d, corner[0], corner[1], w, &exact);
+        else
+            morph_distance_triangle(d, corner[0], corner[1], corner[2], w, &exact);
+        morph_distance_element(d, (const double(*)[3])corner, n, enough, hint, &hinted);
+        if (hinted.triangle < 0) {
+            assert_true(hinted.distance >= enough && hinted.distance <= exact.distance + 1e-12);
+            bounded++;
+        } else {
+            assert_true(fabs(hinted.distance - exact.distance) <= 1e-12);
+            found++;
+        }
+        inside += exact.distance < 0.0;
+    }
+    assert_true(bounded > 20 && found > 20 && inside > 20);
+    morph_distance_destroy(d);
+    morph_mesh_free(&mesh);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_elements_against_brute_force),  cmocka_unit_test(test_no_crossing_is_missed),
-        cmocka_unit_test(test_pierced_by_vertices_and_edges), cmocka_unit_test(test_lattice_degeneracies),
-        cmocka_unit_test(test_element_wholly_inside),         cmocka_unit_test(test_segment_pairs),
+        cmocka_unit_test(test_elements_against_brute_force),
+        cmocka_unit_test(test_no_crossing_is_missed),
+        cmocka_unit_test(test_pierced_by_vertices_and_edges),
+        cmocka_unit_test(test_lattice_degeneracies),
+        cmocka_unit_test(test_element_wholly_inside),
+        cmocka_unit_test(test_segment_pairs),
+        cmocka_unit_test(test_hinted_elements),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
