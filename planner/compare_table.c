@@ -35,7 +35,7 @@ static void fill_row(const morph_compare_result *result, morph_compare_method me
     for (int q = 0; q < MORPH_COMPARE_QUANTITIES; q++)
         number(l->cell[1 + q], "%.4g", morph_compare_value(result, method, (morph_compare_quantity)q));
     number(l->cell[5], "%.1f", row->measured ? 100.0 * row->measure.coverage : (double)NAN);
-    number(l->cell[6], "%.3f",
+    number(l->cell[6], "%.4g",
            morph_compare_ratio(result, method, MORPH_COMPARE_REFERENCE, MORPH_COMPARE_OBJECTIVE));
     number(l->cell[7], "%.1f", row->seconds);
 }
@@ -88,7 +88,7 @@ static void put_medians(morph_text *text, const morph_compare *c) {
         *l = (line){0};
         snprintf(l->cell[0], CELL, "%s", morph_compare_name((morph_compare_method)m));
         for (int q = 0; q < MORPH_COMPARE_QUANTITIES; q++)
-            number(l->cell[1 + q], "%.3f", median.ratio[q]);
+            number(l->cell[1 + q], "%.3g", median.ratio[q]);
         snprintf(l->cell[5], CELL, "%d", median.coverage_lower);
         snprintf(l->cell[6], CELL, "%d", median.feasible);
         snprintf(l->cell[7], CELL, "%d", median.scenes);
