@@ -82,6 +82,7 @@ static void run_scene(morph_compare_result *result, teller *t) {
 morph_status morph_compare_run(const morph_scene *const *scene, int scenes, const morph_control *control,
                                morph_compare **out) {
     *out = NULL;
+    if (scenes < 1) return MORPH_ERR_INPUT;
     /* One BLAS thread: sums then repeat bit for bit. */
     morph_blas_threads(1);
     morph_compare *c = calloc(1, sizeof *c);

@@ -42,7 +42,7 @@ typedef struct morph_compare {
 
 /* Runs every method on every scene; scenes are borrowed and must outlive the result. A method that fails or
  * is not feasible keeps its row and says so. Progress is told as "2/12 plan refine". MORPH_OK also when
- * stopped; MORPH_ERR_NOMEM only for the rows themselves. */
+ * stopped; MORPH_ERR_INPUT without a scene, MORPH_ERR_NOMEM only for the rows themselves. */
 morph_status morph_compare_run(const morph_scene *const *scene, int scenes, const morph_control *control,
                                morph_compare **out);
 void morph_compare_destroy(morph_compare *compare); /* NULL allowed */
