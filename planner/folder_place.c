@@ -104,7 +104,8 @@ static morph_status locate(const char *folder, morph_place *place, char *message
         place->folder = realpath(folder, NULL);
         if (!place->folder)
             return morph_fail(errno == ENOMEM ? MORPH_ERR_NOMEM : MORPH_ERR_IO, message, size,
-                              "%s: cannot be used as plan folder: %s", folder, strerror(errno));
+                              "%s: cannot be used as %s folder: %s", folder, place->kind.what,
+                              strerror(errno));
     } else if (errno != ENOENT) {
         return morph_fail(morph_name_fault(), message, size, "%s: cannot be used as plan folder: %s", folder,
                           strerror(errno));
@@ -114,7 +115,8 @@ static morph_status locate(const char *folder, morph_place *place, char *message
     if (!place->folder || split(place) != MORPH_OK)
         return morph_fail(MORPH_ERR_NOMEM, message, size, "%s: out of memory", folder);
     if (!*place->name || strcmp(place->name, ".") == 0 || strcmp(place->name, "..") == 0)
-        return morph_fail(MORPH_ERR_INPUT, message, size, "\"%s\": is no name for a plan folder", folder);
+        return morph_fail(MORPH_ERR_INPUT, message, size, "\"%s\": is no name for a %s folder", folder,
+                          place->kind.what);
     if (stat(place->parent, &info) != 0)
         return morph_fail(morph_name_fault(), message, size, "%s: the folder for it, %s: %s", folder,
                           place->parent, strerror(errno));
@@ -144,23 +146,30 @@ static morph_status may_replace(const morph_place *place, const char *folder, bo
         return morph_fail(MORPH_ERR_INPUT, message, size,
                           "%s: is there already: name another folder, or exchange it with --overwrite",
                           folder);
-    char *plan = morph_path_join(place->folder, "plan.h5");
-    if (!plan) return morph_fail(MORPH_ERR_NOMEM, message, size, "%s: out of memory", folder);
-    bool known = morph_record_is_plan(plan);
-    free(plan);
+    const morph_place_kind *kind = &place->kind;
+    char *sign = morph_path_join(place->folder, kind->sign);
+    if (!sign) return morph_fail(MORPH_ERR_NOMEM, message, size, "%s: out of memory", folder);
+    bool known = kind->known(sign);
+    free(sign);
     if (!known)
         return morph_fail(MORPH_ERR_INPUT, message, size,
-                          "%s: is not overwritten: it is no plan folder (no plan.h5 of a plan in it)",
-                          folder);
+                          "%s: is not overwritten: it is no %s folder (no %s of a %s in it)", folder,
+                          kind->what, kind->sign, kind->what);
     if (!holds_files_only(place->folder))
         return morph_fail(MORPH_ERR_INPUT, message, size,
-                          "%s: is not overwritten: it holds more than the files of a plan", folder);
+                          "%s: is not overwritten: it holds more than the files of a %s", folder, kind->what);
     return MORPH_OK;
 }
 
 morph_status morph_place_find(const char *folder, bool overwrite, morph_place *place, char *message,
                               size_t size) {
-    *place = (morph_place){.lock = -1};
+    const morph_place_kind plan = {"plan", "plan.h5", morph_record_is_plan};
+    return morph_place_find_kind(folder, overwrite, plan, place, message, size);
+}
+
+morph_status morph_place_find_kind(const char *folder, bool overwrite, morph_place_kind kind,
+                                   morph_place *place, char *message, size_t size) {
+    *place = (morph_place){.kind = kind, .lock = -1};
     morph_status status = locate(folder, place, message, size);
     if (status == MORPH_OK) clean(place);
     if (status == MORPH_OK && place->exists) status = may_replace(place, folder, overwrite, message, size);

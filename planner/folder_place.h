@@ -5,8 +5,15 @@
 
 #include "solvers/base.h"
 
+/* What a folder is told by: only one that holds a file of this name, known by its content, is replaced. */
+typedef struct morph_place_kind {
+    const char *what, *sign; /* "plan", "plan.h5" */
+    bool (*known)(const char *file);
+} morph_place_kind;
+
 /* Owned texts; zeroed is empty. */
 typedef struct morph_place {
+    morph_place_kind kind;
     char *folder; /* the plan folder, without a slash at its end; links resolved if it exists */
     char *parent; /* the folder that it stands in */
     char *name;   /* its name in there */
@@ -19,6 +26,9 @@ typedef struct morph_place {
  * A plan that a killed run left moved aside is put back, hidden folders of killed runs are removed. */
 morph_status morph_place_find(const char *folder, bool overwrite, morph_place *place, char *message,
                               size_t size);
+/* The same for folders of another kind. */
+morph_status morph_place_find_kind(const char *folder, bool overwrite, morph_place_kind kind,
+                                   morph_place *place, char *message, size_t size);
 
 /* Creates the hidden folder. MORPH_ERR_IO. */
 morph_status morph_place_stage(morph_place *place, char *message, size_t size);

@@ -22,7 +22,7 @@ enum morph_exit {
     MORPH_EXIT_DONE = 0,       /* done, and every check holds */
     MORPH_EXIT_INTERNAL = 1,   /* internal error, or memory or disk refused: nothing half-written is left */
     MORPH_EXIT_INPUT = 2,      /* wrong usage or input: nothing written */
-    MORPH_EXIT_INFEASIBLE = 3, /* no feasible plan; check: findings */
+    MORPH_EXIT_INFEASIBLE = 3, /* no feasible plan; check: findings; compare: a method failed */
     MORPH_EXIT_STOPPED = 4     /* stopped by the caller: the folder holds the best so far, marked so */
 };
 
@@ -47,6 +47,11 @@ MORPH_API const char *morph_version(void);
 /* Plans a scene file and writes the plan folder. text: the six lines of the outcome; json: summary.json's
  * content; either may be NULL. They come back NULL where there is no plan. */
 MORPH_API int morph_plan_scene(const char *scene, const morph_job *job, char **text, char **json);
+
+/* Runs every method on every scene file and writes compare.json and compare.html into job->folder (NULL:
+ * "compare" in the current folder). text: the table. MORPH_EXIT_INFEASIBLE if a method failed outright;
+ * what was stopped is written with its rows marked, beside an existing folder as FOLDER.stopped. */
+MORPH_API int morph_compare_scenes(const char *const *scenes, int count, const morph_job *job, char **text);
 
 /* Verifies a plan folder, or a schedule file (schedule: CSV, may be NULL) against its plan. text: a table of
  * the margins. */

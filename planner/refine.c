@@ -13,6 +13,7 @@ morph_refine_options morph_refine_defaults(void) {
                                   .cover_weight = MORPH_COVER_WEIGHT,
                                   .slide = 0.01,
                                   .press = 0.5,
+                                  .blend = 0.1,
                                   .reach = 0.3,
                                   .least_reach = 0.03,
                                   .hold = 1e-3,
@@ -113,7 +114,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     if (count < 0) return MORPH_ERR_NOMEM;
     /* The kink between target and base plane is rounded over a tenth of a spacing: the width of a link and
      * its gap. */
-    morph_gap_term gap = {r->world->cavity, r->world->sdf, 0.1, 1.0, true};
+    morph_gap_term gap = {r->world->cavity, r->world->sdf, r->options->blend, 1.0, true};
     morph_cover_term cover = {r->world->cavity,
                               (const int(*)[3])r->cover_joint,
                               (const double(*)[3])r->cover_weight,

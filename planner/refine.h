@@ -10,6 +10,7 @@ typedef struct morph_refine_options {
     double cover_weight; /* w_c */
     double slide;        /* pull across the target's normal, relative to along it */
     double press;        /* weight of |gap| beside gap^2 at the target's points */
+    double blend;        /* width over which the kink between target and base plane is rounded, spacings */
     double reach;        /* how far a joint may move in one round, spacings: rows are chosen for that reach */
     double upright;      /* weight of cos^2 between posts and their links */
     double least_reach;  /* below this it is settled */

@@ -59,21 +59,24 @@ typedef struct measured {
     const char *name;
     const morph_measure *measure;
 } measured;
-enum { MEASURED = 4 };
+enum { MEASURED = 5 };
 
-static void list_measured(const morph_summary *s, measured list[MEASURED]) {
+/* The reference is not there unless somebody has asked for it. */
+static int list_measured(const morph_summary *s, measured list[MEASURED]) {
     list[0] = (measured){"blanket", s->has_blanket ? &s->blanket : NULL};
     list[1] = (measured){"plan", s->has_plan ? &s->plan : NULL};
     list[2] = (measured){"replay", s->replay.done ? &s->replay.measure : NULL};
     list[3] = (measured){"replay_core", s->replay_core.done ? &s->replay_core.measure : NULL};
+    list[4] = (measured){"reference", &s->reference};
+    return s->has_reference ? MEASURED : MEASURED - 1;
 }
 
 /* One number of each, by its place in the measure. */
 static void put_each(builder *b, cJSON *at, const char *key, const morph_summary *s, size_t field) {
     measured list[MEASURED];
-    list_measured(s, list);
+    const int count = list_measured(s, list);
     cJSON *object = put_object(b, at, key);
-    for (int k = 0; k < MEASURED; k++) {
+    for (int k = 0; k < count; k++) {
         double value = NAN;
         if (list[k].measure) memcpy(&value, (const char *)list[k].measure + field, sizeof value);
         put_number(b, object, list[k].name, value);
@@ -94,12 +97,12 @@ static void put_gap(builder *b, cJSON *at, const char *key, const morph_measure 
 
 static void put_measures(builder *b, cJSON *root, const morph_summary *s) {
     measured list[MEASURED];
-    list_measured(s, list);
+    const int count = list_measured(s, list);
     put_each(b, root, "cavity_volume", s, offsetof(morph_measure, volume));
     put_number(b, root, "target_volume", s->target_volume);
     put_each(b, root, "objective", s, offsetof(morph_measure, objective));
     cJSON *gap = put_object(b, root, "gap");
-    for (int k = 0; k < MEASURED; k++)
+    for (int k = 0; k < count; k++)
         put_gap(b, gap, list[k].name, list[k].measure);
     put_each(b, root, "coverage", s, offsetof(morph_measure, coverage));
 }

@@ -30,6 +30,8 @@ typedef struct morph_summary {
     char reason[512]; /* why not feasible: constraint, element, time, amount; else empty */
     bool has_plan, has_blanket;
     morph_measure blanket, plan;
+    bool has_reference;
+    morph_measure reference; /* without limits of length and angle; planner/reference.h */
     double target_volume;
     morph_reach reach; /* what the target asks of the structure, before anything is solved */
     double spacing;

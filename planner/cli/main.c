@@ -20,6 +20,9 @@ static const char usage_text[] =
     "          [--of MOTION]              of the schedule (default), the blanket, the replay of its "
     "lengths,\n"
     "                                     or core: the replay with the target as a solid core\n"
+    "  compare SCENE... [-o DIR]          blanket, plan and reference side by side: a table, and DIR "
+    "(default: compare)\n"
+    "                                     with compare.json and compare.html\n"
     "  info SCENE                         structure with link numbers, mobility, target; solves nothing\n"
     "\n"
     "options of plan:\n"
@@ -36,7 +39,7 @@ static const char usage_text[] =
     "  --help, --version\n"
     "\n"
     "exit codes: 0 done, every check holds; 1 internal error or machine refused; 2 wrong usage or input;\n"
-    "3 no feasible plan, or findings; 4 interrupted, best so far kept\n";
+    "3 no feasible plan, findings, or a method of compare failed; 4 interrupted, best so far kept\n";
 
 static volatile sig_atomic_t interrupted;
 
@@ -154,6 +157,8 @@ enum {
 
 typedef struct arguments {
     const char *output, *method, *schedule, *motion, *subject;
+    const char *const *subjects; /* of compare; subject is the first */
+    int subject_count;
     bool overwrite, json, quiet, verbose;
 } arguments;
 
@@ -213,7 +218,7 @@ static int take_option(int option, const char *value, arguments *a) {
 }
 
 /* Who takes an option. */
-enum { PLAN = 1, CHECK = 2, PICTURE = 4, INFO = 8, ALL = 15 };
+enum { PLAN = 1, CHECK = 2, PICTURE = 4, INFO = 8, COMPARE = 16, ALL = 31 };
 
 static const struct option options[] = {{"method", required_argument, NULL, O_METHOD},
                                         {"level", required_argument, NULL, O_LEVEL},
@@ -232,7 +237,9 @@ static const struct option options[] = {{"method", required_argument, NULL, O_ME
 static int takers(int option) {
     switch (option) {
     case 'o':
-        return PLAN | PICTURE;
+        return PLAN | PICTURE | COMPARE;
+    case O_OVERWRITE:
+        return PLAN | COMPARE;
     case O_SCHEDULE:
         return CHECK;
     case O_OF:
@@ -277,11 +284,13 @@ static int read_arguments(int argc, char **argv, int command, const char *name, 
         const int code = take_option(option, optarg, a);
         if (code != 0) return code;
     }
-    if (argc - optind != 1)
+    if (argc - optind != 1 && !(command == COMPARE && argc > optind))
         return usage_fault(argc - optind < 1 ? "nothing to work on" : "too many arguments",
                            argc - optind < 1 ? "" : argv[optind + 1],
-                           "one scene (plan, info) or one plan folder (check, picture)");
+                           "one scene (plan, info), scenes (compare) or one plan folder (check, picture)");
     a->subject = argv[optind];
+    a->subjects = (const char *const *)&argv[optind];
+    a->subject_count = argc - optind;
     return 0;
 }
 
@@ -342,14 +351,26 @@ static int run_info(const arguments *a) {
     return code;
 }
 
+static int run_compare(const arguments *a) {
+    screen s;
+    const morph_job job = make_job(a, &s);
+    char *text = NULL;
+    int code = morph_compare_scenes(a->subjects, a->subject_count, &job, &text);
+    clear_bar(&s);
+    code = print_result(text, code);
+    free(text);
+    return code;
+}
+
 int main(int argc, char **argv) {
     static const struct {
         const char *name;
         int (*run)(const arguments *);
         int takes;
-    } commands[] = {{"plan", run_plan, PLAN}, {"check", run_check, CHECK}, {"picture", run_picture, PICTURE},
-                    {"info", run_info, INFO}, {"compare", NULL, 0},        {"export", NULL, 0},
-                    {"trade", NULL, 0}};
+    } commands[] = {
+        {"plan", run_plan, PLAN}, {"check", run_check, CHECK},       {"picture", run_picture, PICTURE},
+        {"info", run_info, INFO}, {"compare", run_compare, COMPARE}, {"export", NULL, 0},
+        {"trade", NULL, 0}};
     arguments a = {0};
     if (argc < 2) {
         fputs(usage_text, stderr);
@@ -357,7 +378,7 @@ int main(int argc, char **argv) {
     }
     if (argv[1][0] == '-') {
         const int code = read_arguments(argc, argv, 0, "", &a);
-        return code ? code : usage_fault("no command", "", "plan, check, picture, info");
+        return code ? code : usage_fault("no command", "", "plan, compare, check, picture, info");
     }
     for (size_t k = 0; k < sizeof commands / sizeof *commands; k++) {
         if (strcmp(argv[1], commands[k].name) != 0) continue;
@@ -369,5 +390,5 @@ int main(int argc, char **argv) {
         sigaction(SIGTERM, &action, NULL);
         return commands[k].run(&a);
     }
-    return usage_fault("unknown command", argv[1], "plan, check, picture, info");
+    return usage_fault("unknown command", argv[1], "plan, compare, check, picture, info");
 }

@@ -178,7 +178,6 @@ later() {
     says "$name"
     absent "$work" later.plan
 }
-later compare compare "$scene"
 later trade trade "$scene"
 later export export "$plan" --format csv
 later '--method nlopt' plan "$scene" --method nlopt

@@ -1,0 +1,121 @@
+#!/bin/sh
+# Methods side by side, through the program: rows, files, exit codes; a method that fails, one that is not feasible, an
+# interrupted run; the same bytes again.
+. "$(dirname "$0")/program.sh"
+mkdir "$work/here" && cd "$work/here" || exit 1
+touch "$work/out" "$work/err"
+
+cat >small.yaml <<'SCENE'
+morphplan: 1
+title: small
+structure: {nodes: [3, 2], spacing: 0.1, link: {stiffness: 20}}
+target: {shape: box, size: [0.1, 0.05, 0.06]}
+motion: {friction: 0.4, time: 0.5}
+schedule: {sample: 0.01}
+SCENE
+{ cat small.yaml && echo 'attractors: none'; } >other.yaml
+sed 's/stiffness: 20}/stiffness: 20}, joints: universal/' small.yaml >universal.yaml
+sed 's/sample: 0.01/sample: 0.01, duration: 0.05/' small.yaml >hasty.yaml
+
+# rows FILE METHOD: how many rows of this method the JSON has; outcomes FILE OUTCOME likewise.
+rows() { grep -c "^	\"method\":	\"$2\"" "$1"; }
+outcomes() { grep -c "^	\"outcome\":	\"$2\"" "$1"; }
+timeless() {
+    sed '/"seconds"/,/}/d; /"peak_memory_bytes"/d; /_seconds"/d' "$1/compare.json"
+    sed 's/<td class="n">[0-9.]*&nbsp;s</</' "$1/compare.html"
+}
+
+# A small scene twice: the same bytes; one method that fails and one that is not feasible keep their rows.
+expect 3 "$program" compare small.yaml universal.yaml hasty.yaml other.yaml --quiet
+if [ -s "$work/err" ]; then fault "--quiet is not quiet"; fi
+holds "two files" [ "$(ls -A compare | tr '\n' ' ')" = "compare.html compare.json " ]
+for method in blanket plan reference; do
+    holds "$method has a row in each scene" [ "$(rows compare/compare.json $method)" -eq 4 ]
+    holds "$method has a row in each table" [ "$(grep -c "^$method " "$work/out")" -eq 5 ]
+done
+holds "what failed says why" [ "$(grep -c 'failed: not available yet: structure.joints: universal' "$work/out")" -eq 2 ]
+holds "two rows failed" [ "$(outcomes compare/compare.json failed)" -eq 2 ]
+holds "a plan that is not feasible says why" grep -q '^plan .* infeasible: schedule.duration: ' "$work/out"
+if LC_ALL=C grep -q '[^ -~]' "$work/out"; then fault "more than ASCII in the table"; fi
+if grep -Eqi ':[[:space:]]*-?(nan|inf)' compare/compare.json; then fault "a number that JSON does not know"; fi
+if grep -q '<script\|http:\|https:' compare/compare.html; then fault "a page that needs scripts or a network"; fi
+no_leftovers .
+
+# Neither this nor anything else is written over unasked.
+fingerprint compare >"$work/before"
+expect 2 "$program" compare small.yaml
+one_line
+says 'compare: is there already'
+unchanged compare "$work/before"
+expect 0 "$program" compare small.yaml other.yaml -o again
+# The second scene is the first but for a word that changes nothing: file and checksum apart, the rows are the same.
+expect 0 "$program" compare small.yaml other.yaml --overwrite
+timeless again >"$work/a"
+timeless compare >"$work/b"
+holds "the same bytes but for times: $(diff "$work/a" "$work/b" | head -n 4)" cmp "$work/a" "$work/b"
+if grep -q failed compare/compare.json; then fault "the old comparison is still there"; fi
+
+# The plan's end is one of the reference's starts: never better than it.
+grep '^plan ' "$work/out" | head -n 2 | while read -r line; do
+    echo "$line" | awk '{ exit !($7 >= 1.0) }' || echo "$line"
+done >"$work/below"
+if [ -s "$work/below" ]; then fault "a plan below its reference: $(cat "$work/below")"; fi
+
+# Bad input: every fault of every scene, and nothing is written.
+sed 's/nodes/node/' small.yaml >bad.yaml
+expect 2 "$program" compare small.yaml bad.yaml missing.yaml -o never
+says '^bad.yaml:3: structure.node: '
+says '^missing.yaml:1: '
+if [ -s "$work/out" ]; then fault "something on stdout"; fi
+absent . never
+expect 2 "$program" compare
+one_line
+expect 2 "$program" compare small.yaml --method ipopt
+one_line
+says 'is no option of compare'
+expect 2 "$program" compare small.yaml -o nowhere/deep
+one_line
+
+# start: compares in the background ($pid) and returns when the second scene's plan has begun.
+start() {
+    "$program" compare small.yaml "$scene" -o "$1" ${2:-} >"$work/out" 2>"$work/err" &
+    pid=$!
+    for wait in $(seq 1200); do
+        if grep -q ' s  2/2 plan' "$work/err"; then return; fi
+        if ! kill -0 "$pid" 2>/dev/null; then break; fi
+        sleep 0.05
+    done
+    fault "the second plan was never told"
+}
+# stops FOLDER: interrupts, and looks for the rows so far.
+stops() {
+    sleep 0.3
+    kill -INT "$pid"
+    code=0
+    wait "$pid" || code=$?
+    if [ "$code" -ne 4 ]; then fault "exit $code instead of 4"; fi
+    holds "six rows in $1" [ "$(grep -c '^	"method"' "$1/compare.json")" -eq 6 ]
+    holds "the plan and the reference are marked" [ "$(outcomes "$1/compare.json" stopped)" -eq 2 ]
+    holds "the table says so" grep -q '^reference .* stopped: ' "$work/out"
+    holds "the page says so" grep -q 'Stopped before it was done' "$1/compare.html"
+    says "the rows so far are in $1"
+    no_leftovers .
+}
+start stopped
+stops stopped
+# What is there stays, and the stopped comparison goes beside it.
+fingerprint again >"$work/before"
+start again --overwrite
+stops again.stopped
+unchanged again "$work/before"
+
+if [ -n "$slow" ]; then exit 0; fi
+
+# The two scenes of the README.
+expect 0 "$program" compare "$scene" "$source/examples/scenes/sphere_4.yaml" -o readme
+holds "both plans hold" [ "$(grep -c '^plan .* \(optimal\|feasible\)' "$work/out")" -eq 2 ]
+holds "both references hold" [ "$(grep -c '^reference .* \(optimal\|feasible\)' "$work/out")" -eq 2 ]
+# Column by column: the plan lies better than the blanket, the reference at least as well as the plan.
+awk '$1 == "blanket" && NF > 8 { b = $2; g = $4 } $1 == "plan" && NF > 8 { p = $2; if (!(p < b && $4 < g && $7 >= 1)) exit 1 }
+     $1 == "reference" && NF > 8 { n++; if (!($2 <= p)) exit 1 } END { if (n != 2) exit 1 }' "$work/out" ||
+    fault "blanket, plan and reference are not in order"
