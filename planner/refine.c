@@ -116,6 +116,10 @@ static morph_status consider(refiner *r, const double *x, const morph_violation 
     return MORPH_OK;
 }
 
+/* While the goal is missed its rows allow this much of its gaps: a problem whose rows hold already asks for
+ * nothing more, and where a round falls short of them it should fall short of less than the goal. */
+#define PRESS 0.5
+
 /* A goal is met to a thousandth of itself, so its rows must be solved further than steering asks; and a miss
  * alone is weighed by multipliers, which come last. */
 static void aim_options(const refiner *r, morph_nlp_options *o) {
@@ -146,7 +150,6 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     /* Half of the joints are in no term of the objective: held weakly where they stand, they take the
      * shortest way, and the Hessian is regular. The weight is small against the gap's (1 per spacing^2 of
      * skin), and the pull vanishes as the rounds settle. */
-    memcpy(r->anchor, r->x, (size_t)n * sizeof *r->x);
     morph_near_term near = {n, r->anchor, r->options->hold};
     blocks[count++] = morph_block_near(&near, NULL);
     /* Of the many shapes with the same cavity (lengths leave motions free) the one with upright posts is
@@ -160,15 +163,16 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
         gap.scale *= r->share;
         cover.scale *= r->share;
         upright.scale *= r->share;
-        status = morph_aim_rows(r->aim, r->x, r->reach, &blocks[count], &slacks);
+        status =
+            morph_aim_rows(r->aim, r->x, r->reach, r->best_miss > 0.0 ? PRESS : 1.0, &blocks[count], &slacks);
         if (status != MORPH_OK) return status;
         count += MORPH_AIM_BLOCKS;
     }
     char message[256] = "";
     morph_nlp *nlp = NULL;
     for (int i = 0; i < n; i++) {
-        r->lower[i] = fmax(r->base[i], r->x[i] - r->reach);
-        r->upper[i] = fmax(r->lower[i], r->x[i]) + r->reach;
+        r->lower[i] = fmax(r->base[i], r->anchor[i] - r->reach);
+        r->upper[i] = fmax(r->lower[i], r->anchor[i]) + r->reach;
     }
     for (int i = n; i < n + slacks; i++) {
         r->lower[i] = 0.0;
@@ -237,18 +241,40 @@ static morph_status passes_through(const refiner *r, const double *x, bool *thro
     return status;
 }
 
+/* Rows that the solve did not have and broke. For the objective alone the projection deals with them; it
+ * knows nothing of the goal, and of a goal that is nearly met the nearest pose within the limits would lose
+ * most. */
+static morph_status add_missed(refiner *r, morph_violation *v, bool *broken) {
+    const morph_nearness near = {.length = 0.1, .angle = 0.15, .clearance = 0.15, .self = 0.1};
+    const morph_status status =
+        morph_pose_examine(r->world, r->x, &r->options->inset, &near, r->active, NULL, v);
+    *broken = status == MORPH_OK && morph_violation_worst(v, morph_pose_tolerance, NULL) > 1.0;
+    return status;
+}
+
 /* One round from the feasible r->x: a solve within reach, its result moved inside the limits, and kept if it
  * is better. */
 static morph_status improve(refiner *r, int round, double *objective) {
     const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
     morph_violation v;
     morph_nlp_result result = {0};
+    memcpy(r->anchor, r->x, bytes);
     morph_status status = choose_rows(r, &v);
     if (status == MORPH_OK) status = solve_round(r, round, &result);
-    if (status != MORPH_OK) return status;
-    morph_effort_add(&r->report->effort, &result);
-    r->report->last = result.outcome;
-    memcpy(r->x, result.x, bytes);
+    for (int again = 0; status == MORPH_OK; again++) {
+        bool broken = false;
+        morph_effort_add(&r->report->effort, &result);
+        r->report->last = result.outcome;
+        memcpy(r->x, result.x, bytes);
+        if (r->chase && again < 4) status = add_missed(r, &v, &broken);
+        if (!broken || status != MORPH_OK) break;
+        morph_nlp_result_free(&result);
+        status = solve_round(r, round, &result);
+    }
+    if (status != MORPH_OK) {
+        morph_nlp_result_free(&result);
+        return status;
+    }
     status = morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
                            &r->report->effort);
     bool through = false;

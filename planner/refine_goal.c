@@ -168,14 +168,14 @@ static morph_status set_slacks(morph_aim *a, const morph_block *rows, double *x,
     return status;
 }
 
-morph_status morph_aim_rows(morph_aim *a, double *x, double reach, morph_block out[MORPH_AIM_BLOCKS],
-                            int *slacks) {
+morph_status morph_aim_rows(morph_aim *a, double *x, double reach, double hard,
+                            morph_block out[MORPH_AIM_BLOCKS], int *slacks) {
     const morph_world *w = a->world;
     const double spacing = w->structure->spacing, shy = 1.0 - INSIDE;
     morph_goal_rows *r = &a->rows;
     *r = (morph_goal_rows){.gap = {w->cavity, w->sdf, BLEND, 1.0, true},
-                           .limit = {shy * a->goal.limit[MORPH_GOAL_MEAN_GAP] / spacing,
-                                     shy * a->goal.limit[MORPH_GOAL_MAX_GAP] / spacing, shy * 0.25},
+                           .limit = {hard * shy * a->goal.limit[MORPH_GOAL_MEAN_GAP] / spacing,
+                                     hard * shy * a->goal.limit[MORPH_GOAL_MAX_GAP] / spacing, shy * 0.25},
                            .round = ROUND,
                            .sample = a->sample,
                            .bias = a->bias,

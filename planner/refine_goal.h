@@ -27,9 +27,10 @@ enum { MORPH_AIM_BLOCKS = 2 };
 /* Measures x (3*joints, scaled; room for the slacks behind) exactly and chooses rows for moves of up to
  * `reach` spacings: the mean; samples that may pass the largest gap; of the exposed points those nearest to
  * the skin whose areas add up to the coverage asked for, as far as they are not safely covered. Sets the
- * slacks behind x so that every row holds, fills out[2] and *slacks. */
-morph_status morph_aim_rows(morph_aim *aim, double *x, double reach, morph_block out[MORPH_AIM_BLOCKS],
-                            int *slacks);
+ * slacks behind x so that every row holds, fills out[2] and *slacks. hard: what share of the gaps that are
+ * allowed the rows allow. */
+morph_status morph_aim_rows(morph_aim *aim, double *x, double reach, double hard,
+                            morph_block out[MORPH_AIM_BLOCKS], int *slacks);
 
 /* Names the limits that stood against a goal, by the multipliers of a solve that minimised the miss alone:
  * each multiplier is how much less would be missed (in spacings, by all prices) per unit of its row; with the
