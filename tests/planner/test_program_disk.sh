@@ -31,8 +31,11 @@ plan -o disk/box.plan
 says 'cannot be written: No space left on device'
 absent disk box.plan
 
-# An old plan survives a new one that has no room.
-mount -o remount,size=40m "$mounted"
+# An old plan survives a new one that has no room: the disk holds one plan and a third.
+run "$program" plan "$scene" --method blanket -o measured.plan
+one=$(du -sk measured.plan | cut -f1)
+rm -r measured.plan
+mount -o remount,size=$((one * 4 / 3))k "$mounted"
 run "$program" plan "$scene" --method blanket -o disk/box.plan
 holds "room for one plan" [ -e disk/box.plan/report.html ]
 fingerprint disk/box.plan >"$work/before"
@@ -42,7 +45,7 @@ unchanged disk/box.plan "$work/before"
 no_leftovers disk
 
 # Pictures: whole or not at all.
-head -c 30000000 /dev/zero >disk/ballast 2>/dev/null
+head -c ${one}000 /dev/zero >disk/ballast 2>/dev/null
 expect 1 "$program" picture disk/box.plan -o disk/box.svg
 says 'box.svg: cannot be written: No space left on device'
 absent disk box.svg

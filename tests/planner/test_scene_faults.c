@@ -64,7 +64,7 @@ static const bad_case cases[] = {
     {2, "[a]: 1", 2, "a list of 1", "unknown key"},
     {2, "\"ti\\ttle\": 1", 2, "\"ti?tle\"", "did you mean title"},
     {5, "  spacing: 0.1\n  thicknes: 0.05", 6, "structure.thicknes", "did you mean thickness?"},
-    {5, "  spacing: 0.1\n  radius: 0.05", 6, "structure.radius", "unknown key, allowed: layout, nodes"},
+    {5, "  spacing: 0.1\n  radius: 0.05", 6, "structure.radius", "unknown key here, did you mean structure.link.radius or target.radius? allowed: layout, nodes"},
     {5, "  spacing: 0.1\n  stiffness: 5", 6, "structure.stiffness",
      "did you mean structure.link.stiffness or structure.angle.stiffness?"},
     {5, "  spacing: 0.1\n  damping: 5", 6, "structure.damping", "did you mean structure.link.damping?"},
