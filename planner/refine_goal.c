@@ -26,15 +26,14 @@ morph_status morph_aim_create(const morph_world *world, const morph_goal *goal, 
     a->sample = morph_alloc(samples, sizeof(int));
     a->bias = morph_alloc(samples, sizeof(double));
     a->point = morph_alloc(points, sizeof(int));
-    a->order = morph_alloc(points, sizeof(int));
     a->distance = morph_alloc(points, sizeof(double));
     a->joint = morph_alloc(points, sizeof(int[3]));
     a->weight = morph_alloc(points, sizeof(double[3]));
     a->price = morph_alloc(points + 2, sizeof(double));
     a->lower = morph_alloc(1 + samples + points, sizeof(double));
     a->upper = morph_alloc(1 + samples + points, sizeof(double));
-    if (!a->sample || !a->bias || !a->point || !a->order || !a->distance || !a->joint || !a->weight ||
-        !a->price || !a->lower || !a->upper) {
+    if (!a->sample || !a->bias || !a->point || !a->distance || !a->joint || !a->weight || !a->price ||
+        !a->lower || !a->upper) {
         morph_aim_destroy(a);
         return MORPH_ERR_NOMEM;
     }
@@ -47,7 +46,6 @@ void morph_aim_destroy(morph_aim *a) {
     free(a->sample);
     free(a->bias);
     free(a->point);
-    free(a->order);
     free(a->distance);
     free(a->joint);
     free(a->weight);
@@ -121,7 +119,7 @@ static morph_status choose_points(morph_aim *a, double reach) {
         whole += c->expose[y].area;
     }
     qsort(list, (size_t)c->exposed, sizeof *list, by_distance);
-    /* Half a point's area less would do for rounding; one point more than asked for is no harm. */
+    /* Where rounding takes one point more than asked for it does no harm. */
     for (int k = 0; k < c->exposed && taken < wanted * whole; k++) {
         taken += c->expose[list[k].point].area;
         if (list[k].distance / spacing > safe) a->point[a->rows.points++] = list[k].point;

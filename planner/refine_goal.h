@@ -11,7 +11,7 @@ typedef struct morph_aim {
     morph_goal goal;
     morph_goal_rows rows;
     morph_price_term prices;
-    int *sample, *point, *order; /* cavity samples; exposed points, twice */
+    int *sample, *point; /* cavity samples; exposed points */
     double *bias, *price, *lower, *upper, *distance;
     int (*joint)[3]; /* of every exposed point, as last measured */
     double (*weight)[3];
