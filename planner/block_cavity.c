@@ -5,7 +5,7 @@
  * and z the height above the base plane, min(f, z) is rounded to m = (f + z - s)/2, s = sqrt((f - z)^2 +
  * e^2): dm = (df (1 - c) + dz (1 + c))/2,  c = (f - z)/s d2m = (1 - c)/2 d2f - (1 - c^2)/(2s) (df - dz)(df -
  * dz)^T */
-static double gap_at(const morph_gap_term *d, const double at[3], double g[3], double h[6]) {
+double morph_gap_at(const morph_gap_term *d, const double at[3], double g[3], double h[6]) {
     const double a = d->cavity->structure->spacing, r = d->cavity->structure->def.radius / a;
     const double world[3] = {a * at[0], a * at[1], a * at[2]};
     const double f = morph_sdf_eval(d->sdf, world, g, h) / a;
@@ -48,7 +48,7 @@ static morph_status gap_value(void *data, const double *x, double *f) {
     for (int q = 0; q < d->cavity->samples; q++) {
         double at[3];
         sample_at(&d->cavity->sample[q], x, at);
-        const double gap = gap_at(d, at, NULL, NULL);
+        const double gap = morph_gap_at(d, at, NULL, NULL);
         f[0] += sample_scale(d, &d->cavity->sample[q]) * gap * gap;
     }
     return MORPH_OK;
@@ -62,7 +62,7 @@ static morph_status gap_walk(void *data, const double *x, const double *weight, 
         const morph_skin_sample *q = &d->cavity->sample[s];
         double at[3], g[3], h[6];
         sample_at(q, x, at);
-        const double gap = gap_at(d, at, g, second && !d->gauss_newton ? h : NULL),
+        const double gap = morph_gap_at(d, at, g, second && !d->gauss_newton ? h : NULL),
                      scale = sample_scale(d, q);
         for (int a = 0; a < 3; a++)
             for (int k = 0; k < 3; k++) {

@@ -120,6 +120,9 @@ typedef struct morph_gap_term {
                           semidefinite */
 } morph_gap_term;
 morph_block morph_block_gap(morph_gap_term *data, const int *unknown);
+/* That gap at a point and its derivatives by the point, in spacings; g, h (packed xx xy xz yy yz zz) may be
+ * NULL, h only with g. */
+double morph_gap_at(const morph_gap_term *data, const double at[3], double g[3], double h[6]);
 
 /* Objective: sum over exposed points of A_y |W x - y|^2 split along the target's normal n and across it:
  * t^2 + press (sqrt(t^2 + 0.01^2) - 0.01) + slide |(I - n n^T)(W x - y)|^2 with t = n.(W x - y) - r. The

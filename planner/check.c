@@ -19,6 +19,7 @@ static const struct {
     [MORPH_MARGIN_BASE] = {"base", "m"},
     [MORPH_MARGIN_SELF_CLEARANCE] = {"self_clearance", "m"},
     [MORPH_MARGIN_COMPATIBILITY] = {"compatibility", "m"},
+    [MORPH_MARGIN_GOAL] = {"goal", "as given"},
 };
 
 const char *morph_margin_name(morph_margin_kind kind) {
@@ -27,6 +28,10 @@ const char *morph_margin_name(morph_margin_kind kind) {
 
 const char *morph_margin_unit(morph_margin_kind kind) {
     return (unsigned)kind < MORPH_MARGIN_KINDS ? margins[kind].unit : "";
+}
+
+const char *morph_margin_unit_of(const morph_margin *margin, morph_margin_kind kind) {
+    return margin->unit ? margin->unit : morph_margin_unit(kind);
 }
 
 void morph_finding_begin(morph_finding *f, double tolerance, double scale) {
@@ -122,7 +127,11 @@ static void conclude(const morph_record *r, const morph_findings *f, morph_check
         if (!from->tested || from->worst == INFINITY) continue;
         *to = (morph_margin){
             .tested = true, .worst = from->worst, .tolerance = from->tolerance, .time = from->time};
-        pair_name(r, from, to->element, sizeof to->element);
+        to->unit = from->unit;
+        if (from->said[0])
+            snprintf(to->element, sizeof to->element, "%s", from->said);
+        else
+            pair_name(r, from, to->element, sizeof to->element);
         if (!(to->worst >= -to->tolerance)) out->feasible = false;
         const double rank = ranking((morph_margin_kind)k, from);
         if (rank < nearest) {
@@ -150,6 +159,7 @@ morph_status morph_check_record(const morph_record *record, const morph_control 
     morph_progress(control, "check", 0.3);
     if (status == MORPH_OK) status = morph_check_clearance(record, control, &f);
     if (status == MORPH_OK) status = morph_check_self(record, control, &f);
+    if (status == MORPH_OK) status = morph_check_goal(record, &f);
     if (status == MORPH_OK) conclude(record, &f, out);
     return status;
 }

@@ -18,11 +18,12 @@ typedef enum morph_margin_kind {
     MORPH_MARGIN_BASE,
     MORPH_MARGIN_SELF_CLEARANCE,
     MORPH_MARGIN_COMPATIBILITY,
+    MORPH_MARGIN_GOAL,
     MORPH_MARGIN_KINDS
 } morph_margin_kind;
 /* "length", "rate", ... as in summary.json */
 const char *morph_margin_name(morph_margin_kind kind);
-const char *morph_margin_unit(morph_margin_kind kind);
+const char *morph_margin_unit(morph_margin_kind kind); /* "as given" for the goal */
 
 /* Positive is inside. */
 typedef struct morph_margin {
@@ -31,7 +32,10 @@ typedef struct morph_margin {
     double tolerance; /* holds when worst >= -tolerance */
     char element[96]; /* "link 17 (2,1)-(3,1) bottom" */
     double time;      /* s */
+    const char *unit; /* where it is not that of the kind; else NULL */
 } morph_margin;
+/* The unit of this very margin. */
+const char *morph_margin_unit_of(const morph_margin *margin, morph_margin_kind kind);
 
 typedef struct morph_check_report {
     bool feasible; /* every tested margin holds */

@@ -42,8 +42,8 @@ static int compare_edges(const void *p, const void *q) {
     return a->forward - b->forward;
 }
 
-/* Closed: every edge is used exactly twice, once in each direction. */
-static morph_status examine_closed(const morph_mesh *m, bool *closed) {
+/* Every edge is used exactly twice, once in each direction. */
+morph_status morph_check_closed(const morph_mesh *m, bool *closed) {
     const size_t n = 3 * (size_t)m->triangles;
     edge *e = morph_alloc(n, sizeof *e);
     if (!e) return MORPH_ERR_NOMEM;
@@ -73,7 +73,7 @@ static morph_status target_create(clearance *c) {
         }
     }
     bool closed = false;
-    morph_status status = examine_closed(m, &closed);
+    morph_status status = morph_check_closed(m, &closed);
     if (status == MORPH_OK) status = morph_solid_create(m->v, m->vertices, m->t, m->triangles, &c->solid);
     if (status == MORPH_OK) status = morph_distance_create(m, closed, &c->exact);
     if (status == MORPH_OK) status = morph_boxes_create(m->v, m->t, m->triangles, &c->boxes);

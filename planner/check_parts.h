@@ -2,6 +2,7 @@
 #ifndef MORPH_CHECK_PARTS_H
 #define MORPH_CHECK_PARTS_H
 
+#include "model/mesh.h"
 #include "planner/check.h"
 
 /* Grid of the tests between samples: 10 times finer than the samples (the contract's number). */
@@ -27,6 +28,8 @@ typedef struct morph_finding {
     double scale; /* what one unit of violation is compared with, in the margin's unit */
     double time;  /* s */
     morph_element a, b;
+    const char *unit; /* NULL: the kind's */
+    char said[96];    /* not empty: what to say instead of a and b */
 } morph_finding;
 
 typedef struct morph_findings {
@@ -87,8 +90,13 @@ void morph_check_curve_lengths(const morph_record *r, int k, double u, double *l
 morph_status morph_check_poses(const morph_record *r, const morph_control *control, morph_findings *f);
 /* Swept distance to the target. */
 morph_status morph_check_clearance(const morph_record *r, const morph_control *control, morph_findings *f);
+/* Is the mesh closed? MORPH_ERR_NOMEM. */
+morph_status morph_check_closed(const morph_mesh *m, bool *closed);
 /* Swept distances of links and posts among themselves. */
 morph_status morph_check_self(const morph_record *r, const morph_control *control, morph_findings *f);
+
+/* Gaps and coverage at the end of the schedule, where the record has a goal. */
+morph_status morph_check_goal(const morph_record *r, morph_findings *f);
 
 /* A table of lengths alone (samples x links): differences against the limits, and the record's joints.
  * MORPH_ERR_NOMEM. */

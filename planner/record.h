@@ -4,11 +4,12 @@
 #ifndef MORPH_RECORD_H
 #define MORPH_RECORD_H
 
-#include "solvers/base.h"
+#include "planner/goal.h"
 
 typedef struct morph_record {
     /* root attributes */
     double base;      /* NaN: none */
+    morph_goal goal;  /* 0 where the scene asks for nothing */
     char program[64]; /* "morphplan 0.1.0" */
     char scene_sha256[65];
     char outcome[16]; /* optimal, feasible, infeasible, stopped */

@@ -90,6 +90,22 @@ static presence look_up(hid_t file, const char *path) {
     return p == PRESENT ? look(file, path) : p;
 }
 
+/* Plans of earlier programs had no goals and say nothing of them. */
+static morph_status read_goal(const reader *r, morph_goal *goal) {
+    for (int k = 0; k < MORPH_GOAL_KINDS; k++) {
+        char name[32], what[48];
+        double limit = NAN;
+        snprintf(name, sizeof name, "goal_%s", morph_goal_name((morph_goal_kind)k));
+        snprintf(what, sizeof what, "attribute %s", name);
+        if (H5Aexists(r->file, name) == 0) continue;
+        if (!get_number(r->file, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, &limit) || limit <= 0.0 ||
+            isinf(limit) || (k == MORPH_GOAL_COVERAGE && limit > 1.0))
+            return refuse(r, what, "must be a positive number (a coverage at most 1), or NaN for none");
+        goal->limit[k] = isnan(limit) ? 0.0 : limit;
+    }
+    return MORPH_OK;
+}
+
 static morph_status read_root(const reader *r, morph_record *record) {
     char format[64];
     int version = 0;
@@ -108,7 +124,7 @@ static morph_status read_root(const reader *r, morph_record *record) {
         return refuse(r, "attribute outcome", "is none of optimal, feasible, infeasible, stopped");
     if (!get_number(r->file, "base", H5T_FLOAT, H5T_NATIVE_DOUBLE, &record->base) || isinf(record->base))
         return refuse(r, "attribute base", "must be a number, or NaN for none");
-    return MORPH_OK;
+    return read_goal(r, &record->goal);
 }
 
 static morph_status read_spacing(const reader *r, morph_record *record) {

@@ -47,6 +47,18 @@ static bool put_number(hid_t at, const char *name, hid_t stored, hid_t memory, c
     return ok;
 }
 
+/* NaN where the scene asks for nothing. */
+static bool put_goal(hid_t file, const morph_goal *goal) {
+    bool ok = true;
+    for (int k = 0; k < MORPH_GOAL_KINDS && ok; k++) {
+        char name[32];
+        const double limit = goal->limit[k] > 0.0 ? goal->limit[k] : (double)NAN;
+        snprintf(name, sizeof name, "goal_%s", morph_goal_name((morph_goal_kind)k));
+        ok = put_number(file, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &limit);
+    }
+    return ok;
+}
+
 static bool put_root(hid_t file, const morph_record *record) {
     int version = MORPH_RECORD_VERSION;
     return put_text(file, "format", MORPH_RECORD_FORMAT) &&
@@ -54,7 +66,8 @@ static bool put_root(hid_t file, const morph_record *record) {
            put_text(file, "program", record->program) &&
            put_text(file, "scene_sha256", record->scene_sha256) &&
            put_text(file, "outcome", record->outcome) &&
-           put_number(file, "base", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &record->base);
+           put_number(file, "base", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &record->base) &&
+           put_goal(file, &record->goal);
 }
 
 static bool put_group(hid_t file, const char *name, const morph_record *record) {

@@ -3,6 +3,8 @@
  * the closest points, and solve again from there. */
 #include "planner/refine.h"
 
+#include "planner/refine_goal.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -35,23 +37,31 @@ typedef struct refiner {
     bool best_feasible, have_best;
     double reach;
     double started;
+    morph_aim *aim;   /* NULL without a goal */
+    double best_miss; /* of the goal */
+    double share;     /* of the objective beside the goal: 1, less while it is missed, 0 at last */
+    bool chase;       /* the goal counts: off until the objective alone has gone as far as it can */
+    bool weigh;       /* name what stands against the goal after this solve */
 } refiner;
 
 static morph_status allocate(refiner *r) {
     const size_t n = 3 * (size_t)r->world->structure->joints, y = (size_t)r->world->cavity->exposed;
-    r->x = morph_alloc(n, sizeof(double));
+    const bool goal = morph_goal_any(&r->options->goal);
+    const size_t wide = n + (goal ? (size_t)morph_aim_slacks(r->world) : 0);
+    r->x = morph_alloc(wide, sizeof(double));
     r->best = morph_alloc(n, sizeof(double));
     r->metres = morph_alloc(n, sizeof(double));
     r->base = morph_alloc(n, sizeof(double));
     r->anchor = morph_alloc(n, sizeof(double));
-    r->lower = morph_alloc(n, sizeof(double));
-    r->upper = morph_alloc(n, sizeof(double));
+    r->lower = morph_alloc(wide, sizeof(double));
+    r->upper = morph_alloc(wide, sizeof(double));
     r->cover_joint = morph_alloc(y, sizeof(int[3]));
     r->cover_weight = morph_alloc(y, sizeof(double[3]));
     if (!r->x || !r->best || !r->metres || !r->base || !r->anchor || !r->lower || !r->upper ||
         !r->cover_joint || !r->cover_weight)
         return MORPH_ERR_NOMEM;
-    return morph_active_create(r->world->structure, &r->active);
+    const morph_status status = goal ? morph_aim_create(r->world, &r->options->goal, &r->aim) : MORPH_OK;
+    return status == MORPH_OK ? morph_active_create(r->world->structure, &r->active) : status;
 }
 
 static void release(refiner *r) {
@@ -65,6 +75,7 @@ static void release(refiner *r) {
     free(r->cover_joint);
     free(r->cover_weight);
     morph_active_destroy(r->active);
+    morph_aim_destroy(r->aim);
 }
 
 static void to_metres(const refiner *r, const double *x) {
@@ -73,8 +84,8 @@ static void to_metres(const refiner *r, const double *x) {
         r->metres[i] = x[i] * s->spacing;
 }
 
-/* Keeps x if it is the best seen: feasible before infeasible, then the objective (exact distances), else the
- * violation. */
+/* Keeps x if it is the best seen: feasible before infeasible, then what it misses of the goal, then the
+ * objective (exact distances), else the violation. */
 static morph_status consider(refiner *r, const double *x, const morph_violation *v, double *objective) {
     morph_measure m;
     to_metres(r, x);
@@ -83,9 +94,12 @@ static morph_status consider(refiner *r, const double *x, const morph_violation 
     *objective = m.objective;
     const double worst = morph_violation_worst(v, morph_pose_tolerance, NULL);
     const bool feasible = worst <= 1.0;
+    const double values[MORPH_GOAL_KINDS] = {m.gap_mean, m.gap_max, m.coverage};
+    const double miss = morph_goal_miss(&r->options->goal, values, r->world->structure->spacing);
+    const bool closer =
+        r->chase && miss != r->best_miss ? miss < r->best_miss : m.objective < r->best_objective;
     const bool better = !r->have_best || (feasible && !r->best_feasible) ||
-                        (feasible == r->best_feasible &&
-                         (feasible ? m.objective < r->best_objective : worst < r->best_violation));
+                        (feasible == r->best_feasible && (feasible ? closer : worst < r->best_violation));
     if (better) {
         memcpy(r->best, x, 3 * (size_t)r->world->structure->joints * sizeof *x);
         r->have_best = true;
@@ -96,10 +110,23 @@ static morph_status consider(refiner *r, const double *x, const morph_violation 
         }
         r->best_feasible = feasible;
         r->best_objective = m.objective;
+        r->best_miss = miss;
         r->best_violation = worst;
         r->report->violation = *v;
     }
     return MORPH_OK;
+}
+
+/* While the goal is missed its rows allow this much of its gaps: a problem whose rows hold already asks for
+ * nothing more, and where a round falls short of them it should fall short of less than the goal. */
+#define PRESS 0.5
+
+/* A goal is met to a thousandth of itself, so its rows must be solved further than steering asks; and a miss
+ * alone is weighed by multipliers, which come last. */
+static void aim_options(const refiner *r, morph_nlp_options *o) {
+    o->tolerance = r->weigh ? 1e-7 : fmin(o->tolerance, 1e-5);
+    o->max_iterations = r->weigh ? 200 : 100;
+    o->violation_tolerance = 1e-4;
 }
 
 static morph_status solve_round(refiner *r, int round, morph_nlp_result *result) {
@@ -109,7 +136,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     morph_status status =
         morph_cavity_closest(r->world->cavity, r->metres, r->cover_joint, r->cover_weight, NULL);
     if (status != MORPH_OK) return status;
-    morph_block blocks[MORPH_POSE_BLOCKS + 4];
+    morph_block blocks[MORPH_POSE_BLOCKS + 4 + MORPH_AIM_BLOCKS];
     int count = morph_active_blocks(r->active, r->world, NULL, &r->options->inset, blocks);
     if (count < 0) return MORPH_ERR_NOMEM;
     /* The kink between target and base plane is rounded over a tenth of a spacing: the width of a link and
@@ -124,7 +151,6 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     /* Half of the joints are in no term of the objective: held weakly where they stand, they take the
      * shortest way, and the Hessian is regular. The weight is small against the gap's (1 per spacing^2 of
      * skin), and the pull vanishes as the rounds settle. */
-    memcpy(r->anchor, r->x, (size_t)n * sizeof *r->x);
     morph_near_term near = {n, r->anchor, r->options->hold};
     blocks[count++] = morph_block_near(&near, NULL);
     /* Of the many shapes with the same cavity (lengths leave motions free) the one with upright posts is
@@ -133,13 +159,28 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     blocks[count++] = morph_block_upright(&upright, NULL);
     blocks[count++] = morph_block_gap(&gap, NULL);
     blocks[count++] = morph_block_cover(&cover, NULL);
+    int slacks = 0;
+    if (r->chase) {
+        gap.scale *= r->share;
+        cover.scale *= r->share;
+        upright.scale *= r->share;
+        status =
+            morph_aim_rows(r->aim, r->x, r->reach, r->best_miss > 0.0 ? PRESS : 1.0, &blocks[count], &slacks);
+        if (status != MORPH_OK) return status;
+        count += MORPH_AIM_BLOCKS;
+    }
     char message[256] = "";
     morph_nlp *nlp = NULL;
     for (int i = 0; i < n; i++) {
-        r->lower[i] = fmax(r->base[i], r->x[i] - r->reach);
-        r->upper[i] = fmax(r->lower[i], r->x[i]) + r->reach;
+        r->lower[i] = fmax(r->base[i], r->anchor[i] - r->reach);
+        r->upper[i] = fmax(r->lower[i], r->anchor[i]) + r->reach;
     }
-    status = morph_nlp_create(n, r->x, r->lower, r->upper, blocks, count, message, sizeof message, &nlp);
+    for (int i = n; i < n + slacks; i++) {
+        r->lower[i] = 0.0;
+        r->upper[i] = INFINITY;
+    }
+    status =
+        morph_nlp_create(n + slacks, r->x, r->lower, r->upper, blocks, count, message, sizeof message, &nlp);
     if (status != MORPH_OK) {
         morph_log(r->options->control, "refine: %s", message);
         return status;
@@ -163,7 +204,11 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     o.control = &r->quiet;
     if (r->options->seconds > 0.0)
         o.max_seconds = fmax(0.1, r->options->seconds - (morph_seconds() - r->started));
+    if (r->chase) aim_options(r, &o);
     status = morph_nlp_solve(nlp, r->x, &o, result);
+    if (status == MORPH_OK && r->weigh)
+        status = morph_limits_against(s, nlp, blocks, count, result, r->base, r->report->against,
+                                      sizeof r->report->against);
     morph_nlp_destroy(nlp);
     return status;
 }
@@ -197,18 +242,40 @@ static morph_status passes_through(const refiner *r, const double *x, bool *thro
     return status;
 }
 
+/* Rows that the solve did not have and broke. For the objective alone the projection deals with them; it
+ * knows nothing of the goal, and of a goal that is nearly met the nearest pose within the limits would lose
+ * most. */
+static morph_status add_missed(refiner *r, morph_violation *v, bool *broken) {
+    const morph_nearness near = {.length = 0.1, .angle = 0.15, .clearance = 0.15, .self = 0.1};
+    const morph_status status =
+        morph_pose_examine(r->world, r->x, &r->options->inset, &near, r->active, NULL, v);
+    *broken = status == MORPH_OK && morph_violation_worst(v, morph_pose_tolerance, NULL) > 1.0;
+    return status;
+}
+
 /* One round from the feasible r->x: a solve within reach, its result moved inside the limits, and kept if it
  * is better. */
 static morph_status improve(refiner *r, int round, double *objective) {
     const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
     morph_violation v;
     morph_nlp_result result = {0};
+    memcpy(r->anchor, r->x, bytes);
     morph_status status = choose_rows(r, &v);
     if (status == MORPH_OK) status = solve_round(r, round, &result);
-    if (status != MORPH_OK) return status;
-    morph_effort_add(&r->report->effort, &result);
-    r->report->last = result.outcome;
-    memcpy(r->x, result.x, bytes);
+    for (int again = 0; status == MORPH_OK; again++) {
+        bool broken = false;
+        morph_effort_add(&r->report->effort, &result);
+        r->report->last = result.outcome;
+        memcpy(r->x, result.x, bytes);
+        if (r->chase && again < 4) status = add_missed(r, &v, &broken);
+        if (!broken || status != MORPH_OK) break;
+        morph_nlp_result_free(&result);
+        status = solve_round(r, round, &result);
+    }
+    if (status != MORPH_OK) {
+        morph_nlp_result_free(&result);
+        return status;
+    }
     status = morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
                            &r->report->effort);
     bool through = false;
@@ -222,13 +289,75 @@ static morph_status improve(refiner *r, int round, double *objective) {
         "refine: round %d: reach %.2f, %s, %d iterations, %d rows, %.2f s; objective %.5g, worst %s %.2g",
         round + 1, r->reach, morph_outcome_text(result.outcome), result.iterations, result.rows,
         result.seconds, *objective, morph_limit_name(which), v.amount[which]);
+    if (r->chase)
+        morph_log(r->options->control, "refine: goal missed by %.4g spacings at best, %.2g of the objective",
+                  r->best_miss, r->share);
     morph_nlp_result_free(&result);
+    return status;
+}
+
+/* Where the rounds would end with the goal missed they go on with the miss alone, once; false: they end. */
+static bool press_on(refiner *r, int *small_gains) {
+    if (!r->chase || !(r->best_miss > 0.0) || r->share == 0.0) return false;
+    r->share = 0.0;
+    r->reach = r->options->reach;
+    *small_gains = 0;
+    return true;
+}
+
+/* Up to `most` rounds from the best so far, until they gain little. */
+static morph_status run_rounds(refiner *r, int most) {
+    const morph_refine_options *o = r->options;
+    const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
+    morph_status status = MORPH_OK;
+    double objective;
+    int small_gains = 0;
+    r->reach = o->reach;
+    for (int n = 0; n < most && status == MORPH_OK; n++) {
+        if ((small_gains >= 2 || !(r->reach > o->least_reach)) && !press_on(r, &small_gains)) break;
+        const bool was_feasible = r->best_feasible, missed = r->chase && r->best_miss > 0.0;
+        const double before = missed ? r->best_miss : r->best_objective;
+        status = improve(r, r->report->rounds, &objective);
+        r->report->rounds++;
+        const double after = missed ? r->best_miss : r->best_objective;
+        const double gain = was_feasible ? before - after : r->best_feasible ? before : 0.0;
+        /* Trust region: a round that did not help was too bold. */
+        r->reach *= gain > 0.0 ? 1.25 : 0.5;
+        r->reach = fmin(r->reach, o->reach);
+        /* A round cut short by its iterations says nothing of how near the best is. */
+        small_gains =
+            gain > 0.01 * before || r->report->last == MORPH_STOPPED ? 0 : small_gains + (gain > 0.0);
+        /* What the objective asks for may stand against the goal: less of it while the goal is missed. */
+        r->share = r->chase && r->best_miss > 0.0 ? 0.3 * r->share : 1.0;
+        memcpy(r->x, r->best, bytes);
+        morph_progress(o->control, "refine", fmin(1.0, (double)r->report->rounds / most));
+        if (morph_stopped(o->control)) status = MORPH_ERR_STOPPED;
+        if (o->seconds > 0.0 && morph_seconds() - r->started > o->seconds) break;
+    }
+    return status;
+}
+
+/* One more round for the miss alone, from the final shape: its multipliers say what stands against less. What
+ * it gains is kept; where that is much, it was not yet the final shape. */
+static morph_status weigh_limits(refiner *r) {
+    const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
+    morph_status status = MORPH_OK;
+    double before = INFINITY, objective;
+    r->share = 0.0;
+    r->weigh = true;
+    for (int k = 0; k < 3 && status == MORPH_OK && r->best_miss > 0.0 && r->best_miss < 0.99 * before; k++) {
+        before = r->best_miss;
+        r->reach = r->options->reach;
+        memcpy(r->x, r->best, bytes);
+        status = improve(r, r->report->rounds++, &objective);
+    }
+    r->weigh = false;
+    if (r->best_miss <= 0.0) r->report->against[0] = '\0';
     return status;
 }
 
 static morph_status rounds(refiner *r) {
     const morph_refine_options *o = r->options;
-    const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
     morph_violation v;
     double objective;
     /* The start as it is, where it holds; else moved inside the limits. */
@@ -238,26 +367,13 @@ static morph_status rounds(refiner *r) {
     morph_status status =
         morph_project(r->world, &o->inset, 8, o->control, r->active, r->x, &v, &r->report->effort);
     if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
-    r->reach = o->reach;
-    int small_gains = 0;
-    for (int round = 0;
-         round < o->rounds && status == MORPH_OK && small_gains < 2 && r->reach > o->least_reach; round++) {
-        const bool was_feasible = r->best_feasible;
-        const double before = r->best_objective;
-        status = improve(r, round, &objective);
-        r->report->rounds = round + 1;
-        const double gain = was_feasible ? before - r->best_objective : r->best_feasible ? before : 0.0;
-        /* Trust region: a round that did not help was too bold. */
-        r->reach *= gain > 0.0 ? 1.25 : 0.5;
-        r->reach = fmin(r->reach, o->reach);
-        /* A round cut short by its iterations says nothing of how near the best is. */
-        small_gains =
-            gain > 0.01 * before || r->report->last == MORPH_STOPPED ? 0 : small_gains + (gain > 0.0);
-        memcpy(r->x, r->best, bytes);
-        morph_progress(o->control, "refine", (round + 1.0) / o->rounds);
-        if (morph_stopped(o->control)) status = MORPH_ERR_STOPPED;
-        if (o->seconds > 0.0 && morph_seconds() - r->started > o->seconds) break;
-    }
+    r->share = 1.0;
+    if (status == MORPH_OK) status = run_rounds(r, o->rounds);
+    /* The goal comes second: from the shape with the least objective it is reached more often, and a goal
+     * that this shape meets costs nothing and changes nothing. */
+    r->chase = r->aim && r->best_miss > 0.0;
+    if (status == MORPH_OK && r->chase) status = run_rounds(r, 2 * o->rounds);
+    if (status == MORPH_OK && r->chase && r->best_feasible && r->best_miss > 0.0) status = weigh_limits(r);
     return status;
 }
 
@@ -274,8 +390,10 @@ morph_status morph_refine(const morph_world *world, const morph_refine_options *
     refiner r = {.world = world, .options = options, .report = report, .started = morph_seconds()};
     *report = (morph_refine_report){.rows_possible = morph_possible_rows(s)};
     morph_status status = allocate(&r);
-    /* The start and one pose a round. */
-    report->station = morph_alloc((size_t)options->rounds + 1, (size_t)n * sizeof(double));
+    /* The start, the same moved inside its limits, and one pose a round; with a goal three times as many
+     * rounds and up to three to weigh. */
+    const int most = morph_goal_any(&options->goal) ? 3 * options->rounds + 5 : options->rounds + 2;
+    report->station = morph_alloc((size_t)most, (size_t)n * sizeof(double));
     if (!report->station) status = MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
         for (int i = 0; i < n; i++)
@@ -290,6 +408,7 @@ morph_status morph_refine(const morph_world *world, const morph_refine_options *
         for (int i = 0; i < n; i++)
             x[i] = r.best[i] * s->spacing;
         report->feasible = r.best_feasible;
+        report->miss = r.best_miss;
     }
     release(&r);
     report->seconds = morph_seconds() - r.started;

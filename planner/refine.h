@@ -3,6 +3,7 @@
 #ifndef MORPH_REFINE_H
 #define MORPH_REFINE_H
 
+#include "planner/goal.h"
 #include "planner/project.h"
 
 typedef struct morph_refine_options {
@@ -17,6 +18,7 @@ typedef struct morph_refine_options {
     double hold;         /* weight that keeps free joints where they stand */
     int rounds;          /* solves, at most */
     double seconds;      /* wall; <= 0: none */
+    morph_goal goal;     /* hard; while it is missed, up to three times as many rounds */
     const morph_control *control;
 } morph_refine_options;
 morph_refine_options morph_refine_defaults(void);
@@ -31,12 +33,15 @@ typedef struct morph_refine_report {
     int stations;              /* poses that were kept on the way, the first inside its limits first */
     double *station;           /* stations x 3*joints, metres; owned: morph_refine_report_free */
     morph_outcome last;        /* what the last solve concluded */
+    double miss;               /* of the goal, by exact measures, see morph_goal_miss; 0: reached, or none */
+    char against[400];         /* where it is missed by a feasible pose: the limits that stood against it */
 } morph_refine_report;
 
 void morph_refine_report_free(morph_refine_report *report);
 
 /* x (3*joints, metres) is start and result: the feasible pose with the least cavity objective that was found,
- * the start included; where none is feasible, the least violating one. MORPH_ERR_STOPPED leaves the best so
+ * the start included; where none is feasible, the least violating one. With a goal a pose that misses it by
+ * less goes before one with less objective. MORPH_ERR_STOPPED leaves the best so
  * far in x. */
 morph_status morph_refine(const morph_world *world, const morph_refine_options *options, double *x,
                           morph_refine_report *report);

@@ -151,6 +151,8 @@ static const char *margin_words(morph_margin_kind kind) {
         return "Clearance among links and posts";
     case MORPH_MARGIN_COMPATIBILITY:
         return "Lengths fit joint positions";
+    case MORPH_MARGIN_GOAL:
+        return "Goal: gap and coverage at the end";
     case MORPH_MARGIN_KINDS:
         break;
     }
@@ -161,7 +163,7 @@ static const char *margin_words(morph_margin_kind kind) {
  * compare at a glance. */
 static void margin_row(morph_text *page, morph_margin_kind kind, const morph_margin *m) {
     bool holds = m->worst >= -m->tolerance;
-    const char *unit = morph_margin_unit(kind);
+    const char *unit = morph_margin_unit_of(m, kind);
     morph_text_add(page, "<tr><td>%s</td>", margin_words(kind));
     if (isfinite(m->worst))
         morph_text_add(page, "<td class=\"n\">%+.3e ", m->worst);

@@ -6,6 +6,7 @@
 #include "model/blanket.h"
 #include "model/mesh.h"
 #include "model/structure.h"
+#include "planner/goal.h"
 
 typedef enum morph_shape {
     MORPH_SHAPE_BOX,
@@ -63,6 +64,7 @@ typedef struct morph_scene {
     double base; /* NaN: none */
     morph_motion_def motion;
     morph_attractors attractors;
+    morph_goal goal;   /* 0 where not asked for */
     double duration;   /* s; 0: auto */
     double sample;     /* s */
     morph_mesh target; /* built, in world coordinates, mended */

@@ -1,5 +1,5 @@
-/* Lists of hands and centres; and sections whose features come later: read and validated, then refused by
- * name, so that nothing that a scene asks for is silently left out. */
+/* Lists of hands and centres, the goal; and sections whose features come later: read and validated, then
+ * refused by name, so that nothing that a scene asks for is silently left out. */
 #include "planner/scene_parts.h"
 
 #include <stdio.h>
@@ -10,7 +10,7 @@ static const morph_range moment_range = {0.0, 3600.0, false, "s"};
 static const morph_range place_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "m"};
 static const morph_range strength_range = {0.0, MORPH_SCENE_LARGEST, false, "N m2"};
 static const morph_range gap_range = {0.0, MORPH_SCENE_LARGEST, true, "m"};
-static const morph_range share_range = {0.0, 1.0, false, ""};
+static const morph_range share_range = {0.0, 1.0, true, ""};
 
 /* A key that an entry must have. */
 static morph_value required(const morph_value *map, const char *key, const char *allowed) {
@@ -129,15 +129,15 @@ static void read_start(const morph_value *root) {
 
 static void read_goal(morph_scene_reader *r, const morph_value *root) {
     const morph_value goal = morph_scene_section(root, "goal");
-    const int before = r->yaml.faults.count;
-    double unused;
     bool any = false;
-    const char *const keys[3] = {"mean_gap", "max_gap", "coverage"};
-    for (int k = 0; k < 3; k++) {
-        const morph_value value = morph_value_get(&goal, keys[k]);
-        any |= morph_value_number(&value, k < 2 ? &gap_range : &share_range, &unused) == MORPH_FOUND;
+    for (int k = 0; k < MORPH_GOAL_KINDS && goal.node; k++) {
+        const morph_value value = morph_value_get(&goal, morph_goal_name((morph_goal_kind)k));
+        const morph_range *range = k == MORPH_GOAL_COVERAGE ? &share_range : &gap_range;
+        any |= morph_value_number(&value, range, &r->scene->goal.limit[k]) != MORPH_ABSENT;
     }
-    if (any && r->yaml.faults.count == before) morph_value_later(&goal, "limits on gap and coverage");
+    /* An unknown key has its own fault. */
+    if (goal.node && !any && goal.node->data.mapping.pairs.start == goal.node->data.mapping.pairs.top)
+        morph_value_fault(&goal, "asks for nothing, allowed: at least one of mean_gap, max_gap, coverage");
 }
 
 void morph_scene_read_extras(morph_scene_reader *r, const morph_value *root) {

@@ -219,6 +219,16 @@ static void put_motion(buffer *b, const morph_scene *scene) {
     put_touch(b, scene);
 }
 
+static void put_goal(buffer *b, const morph_goal *goal) {
+    if (!morph_goal_any(goal)) return;
+    put(b, "goal:\n");
+    for (int k = 0; k < MORPH_GOAL_KINDS; k++) {
+        char key[32];
+        snprintf(key, sizeof key, "  %s", morph_goal_name((morph_goal_kind)k));
+        if (goal->limit[k] > 0.0) put_number(b, key, goal->limit[k]);
+    }
+}
+
 static bool put_scene(buffer *b, const morph_scene *scene, const char *mesh_file) {
     put(b, "morphplan: 1\n");
     if (!put_text(b, "title", scene->title ? scene->title : "morph")) return false;
@@ -231,6 +241,7 @@ static bool put_scene(buffer *b, const morph_scene *scene, const char *mesh_file
     put_motion(b, scene);
     put_attractors(b, scene);
     put(b, "start: flat\n");
+    put_goal(b, &scene->goal);
     put(b, "schedule:\n");
     if (scene->duration > 0.0)
         put_number(b, "  duration", scene->duration);

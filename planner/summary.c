@@ -131,7 +131,7 @@ static void put_margins(builder *b, cJSON *root, const morph_summary *s) {
         put_number(b, margin, "worst", m->worst);
         put_text(b, margin, "element", m->element);
         put_number(b, margin, "time", m->time);
-        put_text(b, margin, "unit", morph_margin_unit((morph_margin_kind)k));
+        put_text(b, margin, "unit", morph_margin_unit_of(m, (morph_margin_kind)k));
         put_number(b, margin, "tolerance", m->tolerance);
         put_bool(b, margin, "holds", m->worst >= -m->tolerance);
     }

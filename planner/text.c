@@ -39,7 +39,7 @@ char *morph_plan_text(const morph_summary *s, const char *folder) {
     else
         fprintf(out, "margin     %s %.3g %s: %s at %.3f s (the tightest; positive is inside)\n",
                 morph_margin_name(s->check.worst), without_sign_of_zero(m->worst),
-                morph_margin_unit(s->check.worst), m->element, m->time);
+                morph_margin_unit_of(m, s->check.worst), m->element, m->time);
     fprintf(out, "duration   %.3f s\n", s->duration);
     if (s->free_motions > 0)
         fprintf(out, "mobility   %d free motions: lengths alone do not fix this shape", s->free_motions);
@@ -63,7 +63,8 @@ static void margin_line(FILE *out, morph_margin_kind kind, const morph_margin *m
     }
     fprintf(out, "%-15s %-5s worst %12.5g %-8s (allowed from %6.0e) at %8.4f s  %s\n",
             morph_margin_name(kind), m->worst >= -m->tolerance ? "holds" : "FAILS",
-            without_sign_of_zero(m->worst), morph_margin_unit(kind), -m->tolerance, m->time, m->element);
+            without_sign_of_zero(m->worst), morph_margin_unit_of(m, kind), -m->tolerance, m->time,
+            m->element);
 }
 
 char *morph_check_text(const morph_check_report *r, bool whole, const char *files) {

@@ -191,7 +191,8 @@ static morph_summary make_summary(void) {
     s.rows_path_possible = 900;
     s.seconds[MORPH_STAGE_PATH] = 1.5;
     s.peak_memory_bytes = 123456789012L;
-    s.check.margin[MORPH_MARGIN_CLEARANCE] = (morph_margin){true, -2e-5, 1e-4, "joint 7 (3,1) bottom", 1.25};
+    s.check.margin[MORPH_MARGIN_CLEARANCE] =
+        (morph_margin){true, -2e-5, 1e-4, "joint 7 (3,1) bottom", 1.25, NULL};
     return s;
 }
 

@@ -224,4 +224,4 @@ read_key '' attractors '[{at: [0, 0, 0], strength: 1.0}]'
 later_key link force '[-50, 50]'
 later_key link stuck '[3, 4]'
 later_key '' start other.plan
-later_key '' goal '{mean_gap: 0.01}'
+read_key '' goal '{mean_gap: 0.01}'

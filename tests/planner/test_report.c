@@ -19,8 +19,8 @@ static morph_summary make_summary(void) {
     s.duration = 4;
     s.free_motions = 26;
     s.check.margin[MORPH_MARGIN_LENGTH] =
-        (morph_margin){true, 1.25e-3, 1e-9, "link 17 (2,1)-(3,1) bottom", 1.5};
-    s.check.margin[MORPH_MARGIN_CLEARANCE] = (morph_margin){true, -5e-3, 1e-4, "joint 3 <x>", 2.5};
+        (morph_margin){true, 1.25e-3, 1e-9, "link 17 (2,1)-(3,1) bottom", 1.5, NULL};
+    s.check.margin[MORPH_MARGIN_CLEARANCE] = (morph_margin){true, -5e-3, 1e-4, "joint 3 <x>", 2.5, NULL};
     return s;
 }
 

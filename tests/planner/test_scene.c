@@ -134,7 +134,7 @@ static const char full[] =
     "  touch: []\n"
     "attractors: none\n"
     "start: flat\n"
-    "goal: {}\n"
+    "goal: {mean_gap: 0.0123, coverage: 1}\n"
     "schedule:\n"
     "  duration: 4.2\n"
     "  sample: 0.002\n";
@@ -165,6 +165,8 @@ static void test_every_key(void **state) {
     assert_true(s->motion.friction == 0 && s->motion.time == 2.5);
     assert_int_equal(s->attractors, MORPH_ATTRACT_NONE);
     assert_true(s->duration == 4.2 && s->sample == 0.002);
+    assert_true(s->goal.limit[MORPH_GOAL_MEAN_GAP] == 0.0123 && s->goal.limit[MORPH_GOAL_MAX_GAP] == 0.0 &&
+                s->goal.limit[MORPH_GOAL_COVERAGE] == 1.0);
     for (int k = 0; k < 3; k++) /* at is the centre of the bounding box */
         assert_true(fabs(0.5 * (s->target_report.lo[k] + s->target_report.hi[k]) - s->target_def.at[k]) <
                     1e-14);
@@ -178,7 +180,7 @@ static void test_every_key(void **state) {
               "target: {shape: box, size: [1, 1, 0.5]}\nbase: none\nmotion:\ngoal:\n");
     for (int k = 0; k < 2; k++)
         assert_true(s->structure.length[k][0] == 0.9 && s->structure.length[k][1] == 1.0);
-    assert_true(isnan(s->base));
+    assert_true(isnan(s->base) && !morph_goal_any(&s->goal));
     assert_true(strcmp(s->sha256, hash) != 0);
     assert_true(fabs(s->target_report.lo[2]) < 1e-15); /* without a base it stands on 0 */
     morph_scene_destroy(s);
@@ -215,6 +217,7 @@ static void assert_same_scene(const morph_scene *a, const morph_scene *b) {
     assert_true(same(t->cell, u->cell) && same(t->scale, u->scale) && same_array(t->fit, u->fit, 3));
     assert_true(same_array(t->rotate, u->rotate, 3) && same_array(t->at, u->at, 3));
     assert_true(same(a->base, b->base) && same(a->duration, b->duration) && same(a->sample, b->sample));
+    assert_true(same_array(a->goal.limit, b->goal.limit, MORPH_GOAL_KINDS));
     assert_int_equal(a->attractors, b->attractors);
     assert_int_equal(a->motion.mode, b->motion.mode);
     assert_true(same_array(&a->motion.height, &b->motion.height, 5));

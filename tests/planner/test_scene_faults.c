@@ -64,7 +64,8 @@ static const bad_case cases[] = {
     {2, "[a]: 1", 2, "a list of 1", "unknown key"},
     {2, "\"ti\\ttle\": 1", 2, "\"ti?tle\"", "did you mean title"},
     {5, "  spacing: 0.1\n  thicknes: 0.05", 6, "structure.thicknes", "did you mean thickness?"},
-    {5, "  spacing: 0.1\n  radius: 0.05", 6, "structure.radius", "unknown key here, did you mean structure.link.radius or target.radius? allowed: layout, nodes"},
+    {5, "  spacing: 0.1\n  radius: 0.05", 6, "structure.radius",
+     "unknown key here, did you mean structure.link.radius or target.radius? allowed: layout, nodes"},
     {5, "  spacing: 0.1\n  stiffness: 5", 6, "structure.stiffness",
      "did you mean structure.link.stiffness or structure.angle.stiffness?"},
     {5, "  spacing: 0.1\n  damping: 5", 6, "structure.damping", "did you mean structure.link.damping?"},
@@ -282,6 +283,12 @@ static const bad_case cases[] = {
     {17, "start: [1]", 17, "start", "a list of 1 is no text"},
     {18, "goal:\n  coverage: 1.1", 19, "goal.coverage", "1.1 is too large"},
     {18, "goal:\n  mean_gap: 0", 19, "goal.mean_gap", "0 is too small"},
+    {18, "goal:\n  coverage: 0", 19, "goal.coverage", "0 is too small, allowed: a number above 0"},
+    {18, "goal:\n  coverage: -0.5", 19, "goal.coverage", "-0.5 is negative"},
+    {18, "goal:\n  max_gap: -1", 19, "goal.max_gap", "-1 is negative, allowed: a number above 0"},
+    {18, "goal:\n  max_gap: inf", 19, "goal.max_gap", "inf is not finite"},
+    {18, "goal:\n  mean_gap: [0.1]", 19, "goal.mean_gap", "a list of 1 is no number"},
+    {18, "goal: {}", 18, "goal", "asks for nothing, allowed: at least one of mean_gap, max_gap, coverage"},
     {18, "goal:\n  gap: 0.1", 19, "goal.gap", "unknown key, allowed: mean_gap, max_gap, coverage"},
     {20, "  duration: soon", 20, "schedule.duration", "soon is no number"},
     {20, "  duration: 0", 20, "schedule.duration", "0 is too small"},
@@ -297,7 +304,6 @@ static const bad_case cases[] = {
     {7, "    force: [-50, 50]", 7, "structure.link.force", "not available yet: structure.link.force: "},
     {7, "    stuck: [0, 61]", 7, "structure.link.stuck", "not available yet: structure.link.stuck: "},
     {17, "start: other.plan", 17, "start", "not available yet: start: other.plan"},
-    {18, "goal:\n  coverage: 0.9", 18, "goal", "not available yet: goal: "},
 };
 
 /* Each case has its one fault and no other. */
