@@ -78,7 +78,7 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
             morph_blanket_find_exact(b, x);
         else
             morph_blanket_find_contacts(b, x);
-        morph_blanket_list_limits(b, x, 0.0, true);
+        morph_blanket_list_limits(b, x, true);
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)
             morph_blanket_sweep(b, x, sweep, 0.0);
@@ -89,11 +89,13 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
 morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     const size_t push = (size_t)b->links * sizeof *b->push, angle = (size_t)b->angles * sizeof *b->angle,
                  touch = (size_t)b->touches * sizeof *b->touch,
-                 wake = (size_t)b->touches * sizeof *b->touch_wake;
+                 wake = (size_t)b->touches * sizeof *b->touch_wake,
+                 spans = (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake;
     memcpy(b->spare_push, b->push, push);
     memcpy(b->spare_angle, b->angle, angle);
     memcpy(b->spare_touch, b->touch, touch);
     memcpy(b->spare_wake, b->touch_wake, wake);
+    memcpy(b->spare_wake + b->touches, b->span_wake, spans);
     memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
     if (b->soft) morph_blanket_soft_hold(b);
     const bool exact = b->exact && (b->sdf || b->soft);
@@ -103,6 +105,7 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     memcpy(b->angle, b->spare_angle, angle);
     memcpy(b->touch, b->spare_touch, touch);
     memcpy(b->touch_wake, b->spare_wake, wake);
+    memcpy(b->span_wake, b->spare_wake + b->touches, spans);
     if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }

@@ -62,13 +62,15 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
     b->spare_push = morph_alloc((size_t)b->links, sizeof *b->spare_push);
     b->spare_angle = morph_alloc((size_t)b->angles, sizeof *b->spare_angle);
+    b->angle_ends = morph_alloc((size_t)b->angles, sizeof *b->angle_ends);
     b->link_wake = morph_alloc((size_t)b->links, sizeof *b->link_wake);
     b->near_link = morph_alloc((size_t)b->links, sizeof *b->near_link);
     b->near_angle = morph_alloc((size_t)b->angles, sizeof *b->near_angle);
     b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
     b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
     b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
-    if (!b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake || !b->hot_link || !b->hot_angle)
+    if (!b->angle_ends || !b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake ||
+        !b->hot_link || !b->hot_angle)
         return MORPH_ERR_NOMEM;
     if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
         return MORPH_ERR_NOMEM;
@@ -89,6 +91,9 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
         morph_link_link_joints(s, t, uj, vj);
         set_angle(&b->angle[n++], uj, vj, s->link_link_limit[t]);
     }
+    for (int t = 0; t < n; t++)
+        for (int k = 0; k < 4; k++)
+            b->angle_ends[t][k] = k < 2 ? b->angle[t].u[k] : b->angle[t].v[k - 2];
     for (int t = 0; t < n; t++)
         for (int k = 0; k < b->angle[t].joints; k++)
             b->angle[t].weight[k] = b->weight[b->angle[t].joint[k]];
@@ -216,55 +221,59 @@ double morph_blanket_cosine(const morph_angle *a, const double *x) {
     return c;
 }
 
-/* A length changes by at most twice what its joints move. */
-static bool link_near(morph_blanket_state *b, int l, const double *x, double near, bool note) {
+/* A length changes by at most what its two ends move. Both what they moved by in this step and what sweeps
+ * may add counts against it. */
+static bool link_near(morph_blanket_state *b, int l, const double *x, double near, double path, bool note) {
     const int *ends = b->structure->link[l];
     const double length = morph_dist(&x[3 * ends[0]], &x[3 * ends[1]]);
-    const double spare = 0.5 * fmin(length - b->limit[l][0], b->limit[l][1] - length) - near;
-    if (note && spare > 0.0) b->link_wake[l] = b->path + spare;
+    const double low = length - b->limit[l][0], high = b->limit[l][1] - length;
+    const double spare = (low < high ? low : high) - near;
+    if (note && spare > 0.0) b->link_wake[l] = path + spare;
     return !(spare > 0.0);
 }
 
-/* With joints moving by m, arms of length a turn by at most 2 m / (a - 2 m) each and the cosine changes by at
- * most their sum: it keeps a distance g where m <= g a / (4 + 2 g). */
+/* With the ends of an arm of length a moving by m in all, it turns by at most m / (a - m); the cosine changes
+ * by at most the sum of both turns: with m for both it keeps a distance g where m <= g a / (1 + g). */
 static bool angle_near(const morph_blanket_state *b, morph_angle *a, const double *x, double near,
-                       bool note) {
+                       double path, bool note) {
     double u[3], v[3];
     arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     if (!(scale > 0.0)) return true;
-    const double c = morph_dot(u, v) / scale, gap = fmin(a->ceiling - c, c - a->floor);
-    const double spare = gap * sqrt(fmin(uu, vv)) / (4.0 + 2.0 * fmax(gap, 0.0)) - near;
-    if (note && spare > 0.0) b->angle_wake[a - b->angle] = b->path + spare;
+    const double c = morph_dot(u, v) / scale, high = a->ceiling - c, low = c - a->floor;
+    const double gap = high < low ? high : low;
+    if (!(gap > 0.0)) return true;
+    const double spare = gap * sqrt(uu < vv ? uu : vv) / (1.0 + gap) - near;
+    if (note && spare > 0.0) b->angle_wake[a - b->angle] = path + spare;
     return !(spare > 0.0);
 }
 
-/* What a step moved the given joints by: sweeps take back at most that, and add what they may. */
-static double own_move(const morph_blanket_state *b, const double *x, const int *joint, int joints) {
-    double most = 0.0, d[3];
-    for (int k = 0; k < joints; k++) {
-        morph_sub(&x[3 * joint[k]], &b->before[3 * joint[k]], d);
-        most = fmax(most, morph_dot(d, d));
-    }
-    return sqrt(most);
-}
-
-void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all) {
-    const double add = SWEEPS_ADD * b->structure->spacing, near = add + move;
-    b->near_links = b->near_angles = 0;
+static void list_links(morph_blanket_state *b, const double *x, double add, bool all) {
+    const double *path = b->path, *move = b->move;
+    b->near_links = 0;
     for (int l = 0; l < b->links; l++) {
-        if (!all && b->path + near < b->link_wake[l]) continue;
-        const double own = all ? add : add + own_move(b, x, b->structure->link[l], 2);
-        if (b->def.drive || link_near(b, l, x, own, !all))
+        const int *e = b->structure->link[l];
+        const double been = path[e[0]] + path[e[1]], near = 2.0 * add + (all ? 0.0 : move[e[0]] + move[e[1]]);
+        if (!all && been + near < b->link_wake[l]) continue;
+        if (b->def.drive || link_near(b, l, x, near, been, !all))
             b->near_link[b->near_links++] = l;
         else
             b->push[l][0] = b->push[l][1] = 0.0;
     }
+}
+
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all) {
+    const double add = SWEEPS_ADD * b->structure->spacing, *path = b->path, *move = b->move;
+    list_links(b, x, add, all);
+    b->near_angles = 0;
     for (int t = 0; t < b->angles; t++) {
-        if (!all && b->path + near < b->angle_wake[t]) continue;
+        const int *e = b->angle_ends[t];
+        const double been = path[e[0]] + path[e[1]] + path[e[2]] + path[e[3]];
+        const double own = all ? 0.0 : move[e[0]] + move[e[1]] + move[e[2]] + move[e[3]];
+        const double near = 4.0 * add + own;
+        if (!all && been + near < b->angle_wake[t]) continue;
         morph_angle *a = &b->angle[t];
-        const double own = all ? add : add + own_move(b, x, a->joint, a->joints);
-        if (angle_near(b, a, x, own, !all))
+        if (angle_near(b, a, x, near, been, !all))
             b->near_angle[b->near_angles++] = t;
         else
             a->push[0] = a->push[1] = 0.0;

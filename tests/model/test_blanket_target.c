@@ -346,7 +346,7 @@ static void test_nothing_is_missed(void **state) {
             for (int j = 0; j < touch->corners; j++)
                 for (int k = 0; k < 3; k++)
                     q[k] += touch->weight[j] * b->x[3 * touch->joint[j] + k];
-            const bool sleeps = b->path < b->touch_wake[t];
+            const bool sleeps = morph_blanket_sleeps(b, t);
             asleep += sleeps;
             if (morph_sdf_eval(b->sdf, q, NULL, NULL) > touch->radius + 2e-3) continue;
             touched++;
