@@ -8,9 +8,6 @@
 /* Places that no step brings closer than this, spacings, are not looked at; elements further away than it are
  * not by exact distances. */
 #define NEAR 0.05
-/* Places closer than this beyond their motion in a step are listed: what sweeps may add to it, as for the
- * other limits. */
-#define LISTED 0.02 /* spacings */
 /* The smooth distance has a slope near 1, less where edges are rounded; a flatter gradient than this is no
  * direction to trust with a full correction. */
 #define LEAST_SLOPE 0.3
@@ -236,13 +233,13 @@ bool morph_blanket_sleeps(const morph_blanket_state *b, int touch) {
 /* What a place must keep from contact, by its span's move in this step, so as not to be looked at: it could
  * come back by the move, and is listed from this far. */
 static double reach_of(const morph_blanket_state *b, int span) {
-    return 2.0 * (b->move[span] + fabs(b->lift_to - b->lift)) + LISTED * b->structure->spacing;
+    return 2.0 * (b->move[span] + fabs(b->lift_to - b->lift)) + b->added;
 }
 
 /* A seeking place looks around when its span has moved by an eighth of its distance: what comes nearer to
  * its element than to it has come no further than to a quarter of that, by the distance's slope. */
 static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double been, double reach) {
-    const double listed = LISTED * b->structure->spacing, lift = fabs(b->lift_to - b->lift);
+    const double listed = b->added, lift = fabs(b->lift_to - b->lift);
     double q[3], from[3], *wake = &b->touch_wake[t - b->touch];
     place_of(x, t->joint, t->corners, t->weight, q);
     place_of(b->before, t->joint, t->corners, t->weight, from);

@@ -54,6 +54,11 @@ typedef struct morph_angle {
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
 #define MORPH_BLANKET_SWEEPS 12
+/* What sweeps may add to a step's motion, spacings: as much again as the longest, of what they have to take
+ * back, and a few times the limits' margins; no more than the most. */
+#define MORPH_BLANKET_ADD 3e-3
+#define MORPH_BLANKET_ADD_MOST 0.02
+
 /* Sweeps end when none of their corrections moves a joint further, spacings: a fiftieth of those margins. */
 #define MORPH_BLANKET_SWEPT 2e-6
 
@@ -144,7 +149,8 @@ typedef struct morph_blanket_state {
     int *hot_link, *hot_angle, *hot_contact;
     int hot_links, hot_angles, hot_contacts;
     bool hot_backward; /* listed in a backward sweep */
-    double stirred;    /* largest motion by a correction in the last sweep, m */
+    double added;   /* what sweeps may add to the motion of a step or a frame, m: what is nearer is listed */
+    double stirred; /* largest motion by a correction in the last sweep, m */
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
     morph_blanket_self *self;
@@ -198,7 +204,7 @@ double morph_blanket_lift(const morph_blanket_def *def, double clock);
 
 /* blanket_path.c */
 morph_status morph_blanket_paths_create(morph_blanket_state *b);
-/* How far every span moved from `before` to x; returns the longest, m. */
+/* How far every span moved from `before` to x, and from that what sweeps may add; returns the longest, m. */
 double morph_blanket_note_moves(morph_blanket_state *b, const double *x);
 /* Adds the step from `before` to b->x to the paths. */
 void morph_blanket_add_paths(morph_blanket_state *b);

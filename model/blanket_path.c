@@ -37,6 +37,8 @@ double morph_blanket_note_moves(morph_blanket_state *b, const double *x) {
         if (b->move[j] > most) most = b->move[j];
     }
     spread(b->structure, b->move);
+    const double spacing = b->structure->spacing;
+    b->added = fmin(most + MORPH_BLANKET_ADD * spacing, MORPH_BLANKET_ADD_MOST * spacing);
     return most;
 }
 

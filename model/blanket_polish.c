@@ -17,8 +17,8 @@
 #define EXACT_ROUNDS 12
 /* Rounds that try equalities alone where no contact is broken. */
 #define ALONE 2
-/* Of lengths, posts, panels and angles at x. */
-static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
+/* Of lengths, posts, panels and, if asked for, angles at x. */
+static morph_violation member_violation(const morph_blanket_state *b, const double *x, bool angles) {
     const morph_structure *s = b->structure;
     morph_violation worst = {.link = -1, .tuple = -1};
     for (int l = 0; l < b->links; l++) {
@@ -34,7 +34,7 @@ static morph_violation member_violation(const morph_blanket_state *b, const doub
     }
     for (int p = 0; p < s->panels; p++)
         worst.panel = fmax(worst.panel, fabs(morph_blanket_panel_sine(s, p, x)));
-    for (int t = 0; t < b->angles; t++) {
+    for (int t = 0; t < b->angles && angles; t++) {
         const double c = morph_blanket_cosine(&b->angle[t], x);
         const double over = fmax(b->angle[t].lowest - c, c - b->angle[t].highest);
         if (over <= worst.angle) continue;
@@ -52,7 +52,7 @@ static bool held(const morph_blanket_state *b, const morph_violation *v) {
 }
 
 morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x) {
-    morph_violation v = member_violation(b, x);
+    morph_violation v = member_violation(b, x, true);
     v.clearance = morph_blanket_depth(b, x);
     return v;
 }
@@ -60,7 +60,9 @@ morph_violation morph_blanket_violation(const morph_blanket_state *b, const doub
 static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int rounds) {
     double before = INFINITY;
     for (int round = 0;; round++) {
-        morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
+        /* Angles are asked for only where a target rises. */
+        morph_violation v = member_violation(b, x, b->def.rise > 0.0);
+        if (!exact) v.clearance = morph_blanket_depth(b, x);
         if (exact) v.clearance = morph_blanket_depth_exact(b, x);
         if (exact && round == 0) b->entered = v.clearance > ENTERED * b->structure->spacing;
         if (held(b, &v) || round == rounds) return v;
@@ -78,6 +80,8 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
             morph_blanket_find_exact(b, x);
         else
             morph_blanket_find_contacts(b, x);
+        b->added =
+            fmin(v.length + v.clearance + MORPH_BLANKET_ADD * spacing, MORPH_BLANKET_ADD_MOST * spacing);
         morph_blanket_list_limits(b, x, true);
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)

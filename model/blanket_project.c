@@ -9,12 +9,12 @@
 #define LENGTH_MARGIN 1e-3 /* spacings */
 #define ANGLE_MARGIN 0.01  /* radians */
 
-/* What sweeps may move a joint by beyond its step, spacings: limits closer than that are listed. */
-#define SWEEPS_ADD 0.02
-
 /* Rows closer to their limits than this are looked at in every sweep: what a sweep moves. */
 #define HOT_LENGTH 0.005 /* spacings */
 #define HOT_COSINE 0.01
+/* Rows whose correction moves no joint further than this, spacings, are left alone until the next complete
+ * sweep: a hundredth of the limits' margins. */
+#define STILL 1e-5
 /* Every so many sweeps one is complete. */
 #define COMPLETE 6
 
@@ -156,13 +156,14 @@ static double unilateral(double *push, double gap) {
 }
 
 /* True if the next sweeps must look at it too. */
-static bool project_length(morph_blanket_state *b, int l, double *x) {
+static bool project_length(morph_blanket_state *b, int l, double *x, double *motion) {
     const int *ends = b->structure->link[l];
     const double *limit = b->limit[l];
     double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], *push = b->push[l], d[3];
     morph_sub(xj, xi, d);
     const double square = morph_dot(d, d);
     const double hot = HOT_LENGTH * b->structure->spacing;
+    *motion = 0.0;
     if (push[0] == 0.0 && push[1] == 0.0 && square > squared(limit[0]) && square < squared(limit[1]))
         return square < squared(limit[0] + hot) || square > squared(fmax(0.0, limit[1] - hot));
     const double length = sqrt(square);
@@ -170,6 +171,7 @@ static bool project_length(morph_blanket_state *b, int l, double *x) {
     double grow = unilateral(&push[0], length - limit[0]);
     if (push[0] == 0.0) grow -= unilateral(&push[1], limit[1] - length);
     note(b, grow);
+    *motion = grow;
     if (grow != 0.0) part(b, ends, xi, xj, d, grow / length);
     return true;
 }
@@ -263,7 +265,7 @@ static void list_links(morph_blanket_state *b, const double *x, double add, bool
 }
 
 void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all) {
-    const double add = SWEEPS_ADD * b->structure->spacing, *path = b->path, *move = b->move;
+    const double add = b->added, *path = b->path, *move = b->move;
     list_links(b, x, add, all);
     b->near_angles = 0;
     for (int t = 0; t < b->angles; t++) {
@@ -423,33 +425,56 @@ static void sweep_complete(morph_blanket_state *b, double *x, bool backward) {
     }
     for (int l = 0; l < b->near_links; l++) {
         const int link = b->near_link[backward ? b->near_links - 1 - l : l];
-        if (project_length(b, link, x)) b->hot_link[b->hot_links++] = link;
+        if (project_length(b, link, x, &motion)) b->hot_link[b->hot_links++] = link;
     }
 }
 
-/* Lists made in a backward sweep run the other way. */
+/* Keeps the order of a list when its rows were looked at from the end. */
+static int close_up(int *list, int length, int kept, bool backward) {
+    if (backward && kept < length) memmove(list, list + length - kept, (size_t)kept * sizeof *list);
+    return kept;
+}
+
+/* Lists made in a backward sweep run the other way. What a row's correction no longer moves by more than
+ * `still` is done until the next complete sweep. */
 static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
-    double motion;
+    const double still = STILL * b->structure->spacing;
+    int kept = 0;
     for (int t = 0; t < b->hot_angles; t++) {
-        project_angle(&b->angle[b->hot_angle[backward ? b->hot_angles - 1 - t : t]], x, &motion);
+        const int at = backward ? b->hot_angles - 1 - t : t, angle = b->hot_angle[at];
+        double motion;
+        project_angle(&b->angle[angle], x, &motion);
         note(b, motion);
+        if (fabs(motion) > still) b->hot_angle[backward ? b->hot_angles - 1 - kept++ : kept++] = angle;
     }
-    for (int l = 0; l < b->hot_links; l++)
-        project_length(b, b->hot_link[backward ? b->hot_links - 1 - l : l], x);
+    b->hot_angles = close_up(b->hot_angle, b->hot_angles, kept, backward);
+    kept = 0;
+    for (int l = 0; l < b->hot_links; l++) {
+        const int at = backward ? b->hot_links - 1 - l : l, link = b->hot_link[at];
+        double motion;
+        project_length(b, link, x, &motion);
+        if (fabs(motion) > still) b->hot_link[backward ? b->hot_links - 1 - kept++ : kept++] = link;
+    }
+    b->hot_links = close_up(b->hot_link, b->hot_links, kept, backward);
 }
 
 static void sweep_contacts(morph_blanket_state *b, double *x, bool complete, bool backward, double friction) {
-    const double hot = HOT_LENGTH * b->structure->spacing;
+    const double hot = HOT_LENGTH * b->structure->spacing, still = STILL * b->structure->spacing;
     for (int n = 0; n < b->contacts && complete; n++) {
         double gap;
         const int contact = backward ? b->contacts - 1 - n : n;
         note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, &gap));
         if (gap < hot || b->contact[contact].push > 0.0) b->hot_contact[b->hot_contacts++] = contact;
     }
-    for (int n = 0; n < b->hot_contacts && !complete; n++) {
+    if (complete) return;
+    int kept = 0;
+    for (int n = 0; n < b->hot_contacts; n++) {
         const int contact = b->hot_contact[backward ? b->hot_contacts - 1 - n : n];
-        note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, NULL));
+        const double motion = morph_blanket_project_contact(&b->contact[contact], x, friction, NULL);
+        note(b, motion);
+        if (motion > still) b->hot_contact[backward ? b->hot_contacts - 1 - kept++ : kept++] = contact;
     }
+    b->hot_contacts = close_up(b->hot_contact, b->hot_contacts, kept, backward);
 }
 
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
@@ -512,8 +537,10 @@ bool morph_blanket_sweep_lengths(morph_blanket_state *b, double *x) {
             if (lengths_hold(b, x)) return true;
             list_lengths(b, x);
         }
-        for (int l = 0; l < b->near_links; l++)
-            project_length(b, b->near_link[sweep & 1 ? b->near_links - 1 - l : l], x);
+        for (int l = 0; l < b->near_links; l++) {
+            double motion;
+            project_length(b, b->near_link[sweep & 1 ? b->near_links - 1 - l : l], x, &motion);
+        }
         project_posts(b, x);
     }
     return lengths_hold(b, x);
