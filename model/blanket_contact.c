@@ -27,7 +27,7 @@
  * rest stay where they are. */
 #define SEEK_GAIN 5e-3
 /* A place's distance is taken anew when it has moved further than this, spacings. */
-#define KEEP_PLANE 1e-3
+#define KEEP_PLANE 4e-3
 
 static morph_touch *add_touch(morph_blanket_state *b, int span, const int *joint, int corners,
                               const double *weight, double radius) {

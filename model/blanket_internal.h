@@ -50,6 +50,9 @@ typedef struct morph_angle {
     double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
     double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
+    /* As the last complete sweep found it: cos = level + sum grad.x, and 1 / sum |grad|^2. */
+    double grad[4][3], level, inverse, size, most;
+    bool linear; /* these are known */
 } morph_angle;
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
@@ -166,7 +169,7 @@ typedef struct morph_blanket_state {
     int *held, holds;       /* sources whose hold is not 0 */
     /* Polishing a frame works on these copies' originals and puts them back. */
     double (*spare_push)[2];
-    morph_angle *spare_angle;
+    double (*spare_angle)[2]; /* pushes */
     morph_touch *spare_touch;
     double *spare_wake; /* touch_wake, span_wake */
 } morph_blanket_state;

@@ -91,25 +91,31 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
 }
 
 morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
-    const size_t push = (size_t)b->links * sizeof *b->push, angle = (size_t)b->angles * sizeof *b->angle,
-                 touch = (size_t)b->touches * sizeof *b->touch,
+    const size_t push = (size_t)b->links * sizeof *b->push, touch = (size_t)b->touches * sizeof *b->touch,
                  wake = (size_t)b->touches * sizeof *b->touch_wake,
                  spans = (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake;
     memcpy(b->spare_push, b->push, push);
-    memcpy(b->spare_angle, b->angle, angle);
-    memcpy(b->spare_touch, b->touch, touch);
-    memcpy(b->spare_wake, b->touch_wake, wake);
-    memcpy(b->spare_wake + b->touches, b->span_wake, spans);
+    for (int t = 0; t < b->angles; t++)
+        memcpy(b->spare_angle[t], b->angle[t].push, sizeof *b->spare_angle);
+    const bool exact = b->exact && (b->sdf || b->soft);
+    /* By exact distances no place moves and none falls asleep. */
+    if (!exact) {
+        memcpy(b->spare_touch, b->touch, touch);
+        memcpy(b->spare_wake, b->touch_wake, wake);
+        memcpy(b->spare_wake + b->touches, b->span_wake, spans);
+    }
     memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
     if (b->soft) morph_blanket_soft_hold(b);
-    const bool exact = b->exact && (b->sdf || b->soft);
     const morph_violation v = polish(b, x, exact, exact ? EXACT_ROUNDS : ROUNDS);
     if (b->soft) morph_blanket_soft_release(b);
     memcpy(b->push, b->spare_push, push);
-    memcpy(b->angle, b->spare_angle, angle);
-    memcpy(b->touch, b->spare_touch, touch);
-    memcpy(b->touch_wake, b->spare_wake, wake);
-    memcpy(b->span_wake, b->spare_wake + b->touches, spans);
+    for (int t = 0; t < b->angles; t++)
+        memcpy(b->angle[t].push, b->spare_angle[t], sizeof *b->spare_angle);
+    if (!exact) {
+        memcpy(b->touch, b->spare_touch, touch);
+        memcpy(b->touch_wake, b->spare_wake, wake);
+        memcpy(b->span_wake, b->spare_wake + b->touches, spans);
+    }
     if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }

@@ -308,23 +308,44 @@ static bool at_work(const morph_angle *a) {
     return a->push[0] != 0.0 || a->push[1] != 0.0;
 }
 
+/* Moves the joints by what an angle of cosine c asks for; longest motion by the correction. */
+static double correct_angle(morph_angle *a, double *x, double c) {
+    double change = unilateral(&a->push[0], clip((c - a->floor) * a->inverse, a->most));
+    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) * a->inverse, a->most));
+    if (change != 0.0) turn(a, x, (const double(*)[3])a->grad, change);
+    return change * a->size;
+}
+
+/* Between complete sweeps the cosine is taken as linear: joints move by fractions of HOT_LENGTH (or all
+ * sweeps are complete), over which its second derivatives, at most 4 / arm^2, change it by less than 1e-4. */
+static double linear_angle(morph_angle *a, double *x) {
+    double c = a->level;
+    for (int j = 0; j < a->joints; j++)
+        c += morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    return at_work(a) || c < a->floor || c > a->ceiling ? correct_angle(a, x, c) : 0.0;
+}
+
 /* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
  * the shorter arm. *motion: longest by the correction. True if the next sweeps must look at it too. */
 static bool project_angle(morph_angle *a, double *x, double *motion) {
-    double c, arm, grad[4][3], u[3], v[3];
+    double c, arm, u[3], v[3];
     *motion = 0.0;
+    a->linear = false;
     if (!at_work(a)) {
         arms(a, x, u, v);
         if (cosine_within(u, v, a->floor + HOT_COSINE, a->ceiling - HOT_COSINE)) return false;
         if (cosine_within(u, v, a->floor, a->ceiling)) return true;
     }
-    const double square = cosine(a, x, &c, grad, &arm);
+    const double square = cosine(a, x, &c, a->grad, &arm);
     if (square == 0.0) return true;
-    const double most = 0.5 * arm / sqrt(square);
-    double change = unilateral(&a->push[0], clip((c - a->floor) / square, most));
-    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) / square, most));
-    turn(a, x, (const double(*)[3])grad, change);
-    *motion = change * sqrt(square);
+    a->size = sqrt(square);
+    a->inverse = 1.0 / square;
+    a->most = 0.5 * arm / a->size;
+    a->linear = true;
+    a->level = c;
+    for (int j = 0; j < a->joints; j++)
+        a->level -= morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    *motion = correct_angle(a, x, c);
     return true;
 }
 
@@ -442,8 +463,12 @@ static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
     int kept = 0;
     for (int t = 0; t < b->hot_angles; t++) {
         const int at = backward ? b->hot_angles - 1 - t : t, angle = b->hot_angle[at];
+        morph_angle *a = &b->angle[angle];
         double motion;
-        project_angle(&b->angle[angle], x, &motion);
+        if (a->linear)
+            motion = linear_angle(a, x);
+        else
+            project_angle(a, x, &motion);
         note(b, motion);
         if (fabs(motion) > still) b->hot_angle[backward ? b->hot_angles - 1 - kept++ : kept++] = angle;
     }
