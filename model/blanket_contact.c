@@ -28,6 +28,8 @@
 #define SEEK_GAIN 5e-3
 /* A place's distance is taken anew when it has moved further than this, spacings. */
 #define KEEP_PLANE 4e-3
+/* Nor than by this part of its radius: targets as thin as that turn their distance within it. */
+#define KEEP_RADIUS 0.1
 
 static morph_touch *add_touch(morph_blanket_state *b, int span, const int *joint, int corners,
                               const double *weight, double radius) {
@@ -108,7 +110,7 @@ static double distance_at(const morph_blanket_state *b, const double q[3], doubl
  * curvature of a spacing the plane is then off by KEEP_PLANE^2 / 2 spacings. */
 static bool has_moved(const morph_blanket_state *b, const morph_touch *t, const double q[3]) {
     const double d[3] = {q[0] - t->at[0], q[1] - t->at[1], q[2] - b->lift_to - t->at[2]};
-    const double keep = KEEP_PLANE * b->structure->spacing;
+    const double keep = fmin(KEEP_PLANE * b->structure->spacing, KEEP_RADIUS * t->radius);
     return !t->known || morph_dot(d, d) > keep * keep;
 }
 

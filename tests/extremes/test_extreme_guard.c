@@ -95,7 +95,7 @@ static void test_thin(void **state) {
         double radius, speed;
         bool passes; /* without the guard */
     } cases[] = {{NEEDLE, 0.004, 2.0, true},   {NEEDLE, 0.004, 10.0, true},  {NEEDLE, 0.004, 100.0, true},
-                 {WIRE, 0.004, 80.0, true},    {NEEDLE, 0.04, 2.0, false},   {NEEDLE, 0.04, 10.0, false},
+                 {WIRE, 0.004, 100.0, true},   {NEEDLE, 0.04, 2.0, false},   {NEEDLE, 0.04, 10.0, false},
                  {NEEDLE, 0.04, 100.0, false}, {WIRE, 0.04, 100.0, false},   {WIRE, 0.004, 2.0, false},
                  {WIRE, 0.004, 10.0, false},   {PLATE, 0.04, 100.0, false},  {PLATE, 0.04, 1000.0, false},
                  {PLATE, 0.004, 100.0, false}, {PLATE, 0.004, 1000.0, false}};
