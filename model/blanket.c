@@ -352,6 +352,7 @@ morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf
     morph_status status = morph_blanket_state_create(structure, sdf, def, x0, &b);
     if (status != MORPH_OK) return status;
     if (!def->body) b->exact = exact;
+    b->convex = b->exact && morph_distance_convex(b->exact);
     /* A frame more where the time is no whole number of them: the last then lies beyond it. */
     const double frames = ceil(def->time / def->frame * (1.0 - 1e-12)) + 1.0;
     if (!(frames <= MOST_FRAMES) || steps_per_frame(structure, def) == 0)

@@ -8,9 +8,6 @@
 /* Places that no step brings closer than this, spacings, are not looked at; elements further away than it are
  * not by exact distances. */
 #define NEAR 0.05
-/* Places closer than this beyond their motion in a step are listed: what sweeps may add to it, as for the
- * other limits. */
-#define LISTED 0.02 /* spacings */
 /* The smooth distance has a slope near 1, less where edges are rounded; a flatter gradient than this is no
  * direction to trust with a full correction. */
 #define LEAST_SLOPE 0.3
@@ -30,12 +27,16 @@
  * rest stay where they are. */
 #define SEEK_GAIN 5e-3
 /* A place's distance is taken anew when it has moved further than this, spacings. */
-#define KEEP_PLANE 1e-3
+#define KEEP_PLANE 4e-3
+/* Nor than by this part of its radius: targets as thin as that turn their distance within it. */
+#define KEEP_RADIUS 0.1
 
-static morph_touch *add_touch(morph_blanket_state *b, const int *joint, int corners, const double *weight,
-                              double radius) {
+static morph_touch *add_touch(morph_blanket_state *b, int span, const int *joint, int corners,
+                              const double *weight, double radius) {
     morph_touch *t = &b->touch[b->touches++];
     memset(t, 0, sizeof *t);
+    t->span = span;
+    b->first_touch[span + 1] = b->touches;
     t->corners = corners;
     t->radius = radius;
     for (int k = 0; k < corners; k++) {
@@ -64,24 +65,29 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     b->touch_wake = morph_alloc(most, sizeof *b->touch_wake);
     b->hot_contact = morph_alloc(most + (size_t)s->joints, sizeof *b->hot_contact);
     b->held = morph_alloc(most + (size_t)s->joints, sizeof *b->held);
-    b->spare_wake = morph_alloc(most, sizeof *b->spare_wake);
-    if (!b->touch_wake || !b->hot_contact || !b->held || !b->spare_wake) return MORPH_ERR_NOMEM;
+    const size_t spans = (size_t)(s->joints + s->links + s->skin_triangles);
+    b->spare_wake = morph_alloc(most + spans, sizeof *b->spare_wake);
+    b->span_wake = morph_alloc(spans, sizeof *b->span_wake);
+    b->first_touch = morph_alloc(spans + 1, sizeof *b->first_touch);
+    if (!b->span_wake || !b->first_touch || !b->touch_wake || !b->hot_contact || !b->held || !b->spare_wake)
+        return MORPH_ERR_NOMEM;
     if (!b->touch || !b->contact || !b->hold || !b->spare_touch || !b->memo) return MORPH_ERR_NOMEM;
     if (!b->sdf) return MORPH_OK;
     for (int j = 0; j < s->joints; j++)
-        add_touch(b, &j, 1, &whole, s->def.radius);
+        add_touch(b, j, &j, 1, &whole, s->def.radius);
     for (int l = 0; l < s->links; l++) {
         for (int k = 0; k < 3; k++)
-            add_touch(b, s->link[l], 2, along[k], s->link_radius[l]);
+            add_touch(b, b->joints + l, s->link[l], 2, along[k], s->link_radius[l]);
         if (s->link_kind[l] == MORPH_LINK_BOTTOM) continue;
         b->memo[l].touch = b->touches;
-        add_touch(b, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
+        add_touch(b, b->joints + l, s->link[l], 2, along[1], s->link_radius[l])->stride = LONGEST_STRIDE;
     }
     for (int t = 0; t < s->skin_triangles; t++) {
         for (int k = 0; k < 4; k++)
-            add_touch(b, s->skin[t], 3, within[k], s->def.radius);
+            add_touch(b, b->joints + b->links + t, s->skin[t], 3, within[k], s->def.radius);
         b->memo[s->links + t].touch = b->touches;
-        add_touch(b, s->skin[t], 3, within[3], s->def.radius)->stride = LONGEST_STRIDE;
+        add_touch(b, b->joints + b->links + t, s->skin[t], 3, within[3], s->def.radius)->stride =
+            LONGEST_STRIDE;
     }
     return MORPH_OK;
 }
@@ -104,7 +110,7 @@ static double distance_at(const morph_blanket_state *b, const double q[3], doubl
  * curvature of a spacing the plane is then off by KEEP_PLANE^2 / 2 spacings. */
 static bool has_moved(const morph_blanket_state *b, const morph_touch *t, const double q[3]) {
     const double d[3] = {q[0] - t->at[0], q[1] - t->at[1], q[2] - b->lift_to - t->at[2]};
-    const double keep = KEEP_PLANE * b->structure->spacing;
+    const double keep = fmin(KEEP_PLANE * b->structure->spacing, KEEP_RADIUS * t->radius);
     return !t->known || morph_dot(d, d) > keep * keep;
 }
 
@@ -222,35 +228,51 @@ static double spare_since(const morph_blanket_state *b, const morph_touch *t, co
     return t->known ? (t->phi - t->radius - listed) / MOST_SLOPE - morph_dist(p, t->at) : -1.0;
 }
 
-/* A seeking place looks around when the joints have moved by an eighth of its distance: what comes nearer to
- * its element than to it has come no further than to a quarter of that, by the distance's slope. */
-static void sleep_until(morph_blanket_state *b, const morph_touch *t, double spare, double move) {
-    b->touch_wake[t - b->touch] = b->path - move + spare;
+bool morph_blanket_sleeps(const morph_blanket_state *b, int touch) {
+    return b->path[b->touch[touch].span] + b->lift_path < b->touch_wake[touch];
 }
 
-static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double move) {
-    const double listed = LISTED * b->structure->spacing, lift = fabs(b->lift_to - b->lift);
-    double q[3], from[3];
+/* What a place must keep from contact, by its span's move in this step, so as not to be looked at: it could
+ * come back by the move, and is listed from this far. */
+static double reach_of(const morph_blanket_state *b, int span) {
+    return 2.0 * (b->move[span] + fabs(b->lift_to - b->lift)) + b->added;
+}
+
+/* A seeking place looks around when its span has moved by an eighth of its distance: what comes nearer to
+ * its element than to it has come no further than to a quarter of that, by the distance's slope. */
+static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double been, double reach) {
+    const double listed = b->added, lift = fabs(b->lift_to - b->lift);
+    double q[3], from[3], *wake = &b->touch_wake[t - b->touch];
     place_of(x, t->joint, t->corners, t->weight, q);
     place_of(b->before, t->joint, t->corners, t->weight, from);
     const double own = listed + morph_dist(q, from) + lift;
     if (t->stride == 0.0 && spare_since(b, t, q, own) > 0.0) return;
     const bool moved = has_moved(b, t, q);
     double gap = distance_of(b, t, q, NULL) - t->radius;
-    const double near = NEAR * b->structure->spacing + move;
-    if (t->stride == 0.0 && gap / MOST_SLOPE > near) {
-        sleep_until(b, t, gap / MOST_SLOPE - near, move);
+    if (t->stride == 0.0 && gap / MOST_SLOPE > reach) {
+        *wake = been + gap / MOST_SLOPE - b->move[t->span] - lift;
         return;
     }
     /* What rests has found its deepest place; exact distances look after it from frame to frame. */
     if (t->stride > SHORTEST_STRIDE || (t->stride > 0.0 && moved))
         gap = seek(b, t, x, gap + t->radius) - t->radius;
     if (gap > own) {
-        if (t->stride > 0.0) sleep_until(b, t, (gap - listed) / 8.0, 0.0);
+        if (t->stride > 0.0) *wake = been + (gap - listed) / 8.0;
         return;
     }
     morph_contact *c = add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
     if (swept(b, c, x, t->radius) || set_plane(b, c, x, t->radius)) b->contacts++;
+}
+
+/* The places of a span that may touch in this step. */
+static void find_span(morph_blanket_state *b, int span, const double *x) {
+    const double been = b->path[span] + b->lift_path, reach = reach_of(b, span);
+    double first = INFINITY;
+    for (int t = b->first_touch[span]; t < b->first_touch[span + 1]; t++) {
+        if (!(been + reach < b->touch_wake[t])) find_target(b, &b->touch[t], x, been, reach);
+        first = fmin(first, b->touch_wake[t]);
+    }
+    b->span_wake[span] = first;
 }
 
 /* Links and skin lie above the plane wherever their joints do. */
@@ -271,6 +293,8 @@ void morph_blanket_forget(morph_blanket_state *b) {
     for (int t = 0; t < b->angles; t++)
         b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
     memset(b->touch_wake, 0, (size_t)b->touches * sizeof *b->touch_wake);
+    memset(b->span_wake, 0,
+           (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake);
     memset(b->angle_wake, 0, (size_t)b->angles * sizeof *b->angle_wake);
     memset(b->link_wake, 0, (size_t)b->links * sizeof *b->link_wake);
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
@@ -291,11 +315,12 @@ double morph_blanket_moved(const morph_blanket_state *b, const double *x) {
 }
 
 void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
-    b->moved = morph_blanket_moved(b, x);
+    b->moved = morph_blanket_note_moves(b, x);
     const double move = b->moved + fabs(b->lift_to - b->lift);
     b->contacts = 0;
-    for (int t = 0; t < b->touches; t++)
-        if (!(b->path + move < b->touch_wake[t])) find_target(b, &b->touch[t], x, move);
+    const int spans = b->touches > 0 ? b->joints + b->links + b->structure->skin_triangles : 0;
+    for (int n = 0; n < spans; n++)
+        if (!(b->path[n] + b->lift_path + reach_of(b, n) < b->span_wake[n])) find_span(b, n, x);
     if (!isnan(b->def.base)) find_base(b, x, move);
     if (b->soft) morph_blanket_soft_find(b, x, NEAR * b->structure->spacing + move);
 }
@@ -389,7 +414,7 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
     double depth = base_depth(b, x);
     for (int k = 0; k < b->touches; k++) {
         const morph_touch *t = &b->touch[k];
-        if (b->path < b->touch_wake[k]) continue;
+        if (morph_blanket_sleeps(b, k)) continue;
         double q[3];
         place_of(x, t->joint, t->corners, t->weight, q);
         depth = fmax(depth, t->radius - distance_at(b, q, NULL));
@@ -446,6 +471,23 @@ static double moved_since(const morph_memo *memo, const double v[3][3], int corn
     return moved;
 }
 
+/* What moved has come nearer by no more than it moved. A convex target lies wholly behind the plane through
+ * the closest point: an element that slides along it stays clear however far. */
+double morph_blanket_gap_bound(const morph_blanket_state *b, int n, const double v[3][3]) {
+    const morph_memo *memo = &b->memo[n];
+    const element e = element_of(b->structure, n);
+    if (!memo->known) return -INFINITY;
+    const double bound = memo->gap - moved_since(memo, v, e.corners);
+    if (!b->convex || memo->bounded || !(memo->gap + e.radius > 0.0)) return bound;
+    double least = INFINITY;
+    for (int k = 0; k < e.corners; k++) {
+        double d[3];
+        morph_sub(v[k], memo->point, d);
+        least = fmin(least, morph_dot(memo->normal, d));
+    }
+    return fmax(bound, least - e.radius);
+}
+
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
     const double allowed = 0.5 * MORPH_BLANKET_CLEARANCE_HELD * s->spacing;
@@ -456,8 +498,7 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
         morph_memo *memo = &b->memo[n];
         double v[3][3] = {{0.0}};
         place_element(b, x, e.joint, e.corners, v);
-        const double bound =
-            memo->known ? memo->gap - moved_since(memo, (const double(*)[3])v, e.corners) : -INFINITY;
+        const double bound = morph_blanket_gap_bound(b, n, (const double(*)[3])v);
         depth = fmax(depth, bound >= -allowed ? -bound : 0.0);
         if (bound >= -allowed) continue;
         measure(b, &e, (const double(*)[3])v, memo);
@@ -482,7 +523,7 @@ void morph_blanket_seek_deepest(morph_blanket_state *b) {
             continue;
         memcpy(t->weight, memo->weight, sizeof t->weight);
         t->stride = SHORTEST_STRIDE;
-        b->touch_wake[memo->touch] = 0.0;
+        b->touch_wake[memo->touch] = b->span_wake[t->span] = 0.0;
     }
 }
 

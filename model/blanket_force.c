@@ -229,17 +229,10 @@ static double step_work(const morph_blanket_state *b) {
 }
 
 /* What the projection moved becomes velocity, so an impact is plastic and a held constraint carries no speed.
- * Returns the longest motion of a joint. */
-static double take_velocity(morph_blanket_state *b) {
-    double fastest = 0.0;
-    for (int j = 0; j < b->joints; j++) {
-        double move[3];
-        morph_sub(&b->x[3 * j], &b->before[3 * j], move);
-        for (int k = 0; k < 3; k++)
-            b->v[3 * j + k] = move[k] / b->step;
-        fastest = fmax(fastest, morph_dot(move, move));
-    }
-    return sqrt(fastest);
+ */
+static void take_velocity(morph_blanket_state *b) {
+    for (int k = 0; k < 3 * b->joints; k++)
+        b->v[k] = (b->x[k] - b->before[k]) / b->step;
 }
 
 /* Drift, then everything hard by projection. False when a joint moves further than contacts are safe for. */
@@ -254,10 +247,10 @@ static bool drift(morph_blanket_state *b) {
     if (!(fastest <= b->most_move) || !morph_blanket_finite(b)) return false;
     if (b->soft && !morph_blanket_soft_step(b)) return false;
     morph_blanket_project_posts_along(b);
-    const double moved = morph_blanket_moved(b, b->x);
-    b->status = morph_blanket_find_self(b, moved);
+    morph_blanket_note_moves(b, b->x);
+    b->status = morph_blanket_find_self(b);
     if (b->status != MORPH_OK) return false;
-    morph_blanket_list_limits(b, b->x, moved, false);
+    morph_blanket_list_limits(b, b->x, false);
     morph_blanket_find_contacts(b, b->x);
     if (b->guard.watched > 0) morph_blanket_guard_contacts(b);
     morph_blanket_project_start(b, b->x, WARM);
@@ -269,7 +262,8 @@ static bool drift(morph_blanket_state *b) {
     morph_blanket_keep_contacts(b);
     if (!morph_blanket_guard(b)) return false;
     if (b->soft) morph_blanket_soft_moved(b);
-    b->path += take_velocity(b) + fabs(b->lift_to - b->lift);
+    take_velocity(b);
+    morph_blanket_add_paths(b);
     b->work += step_work(b);
     return morph_blanket_finite(b);
 }

@@ -12,6 +12,7 @@
 /* A place on a joint (1 corner), a link (2) or a skin triangle (3) that may touch the target. */
 typedef struct morph_touch {
     int joint[3], corners;
+    int span;
     double weight[3];        /* barycentric */
     double radius;           /* m */
     double stride;           /* of the search for the deepest place on the element; 0: the place is fixed */
@@ -49,10 +50,18 @@ typedef struct morph_angle {
     double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
     double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
+    /* As the last complete sweep found it: cos = level + sum grad.x, and 1 / sum |grad|^2. */
+    double grad[4][3], level, inverse, size, most;
+    bool linear; /* these are known */
 } morph_angle;
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
 #define MORPH_BLANKET_SWEEPS 12
+/* What sweeps may add to a step's motion, spacings: as much again as the longest, of what they have to take
+ * back, and a few times the limits' margins; no more than the most. */
+#define MORPH_BLANKET_ADD 3e-3
+#define MORPH_BLANKET_ADD_MOST 0.02
+
 /* Sweeps end when none of their corrections moves a joint further, spacings: a fiftieth of those margins. */
 #define MORPH_BLANKET_SWEPT 2e-6
 
@@ -103,6 +112,7 @@ typedef struct morph_blanket_state {
     const morph_structure *structure;
     const morph_sdf *sdf;        /* NULL: no target */
     const morph_distance *exact; /* may be NULL */
+    bool convex;                 /* so is the target of `exact` */
     morph_blanket_def def;
     int joints, links, posts, angles, touches, contacts;
     double step;          /* s */
@@ -118,7 +128,6 @@ typedef struct morph_blanket_state {
     double changed;          /* largest motion by a correction in this sweep, m */
     double most_move;        /* m in a step */
     double work;             /* done on the blanket since the frame's start by what it does not store, J */
-    double path;             /* sum over the steps of the fastest joint's motion, m */
     double *x, *v;           /* 3*joints */
     double *a;               /* acceleration at x by springs and gravity */
     double *before;          /* x at the step's start */
@@ -127,15 +136,24 @@ typedef struct morph_blanket_state {
     double (*bound)[2];      /* links: the limits that hold: the structure's, or the prescribed lengths */
     double (*limit)[2];      /* links: what the projection aims at, a little inside */
     double (*push)[2];       /* links: accumulated corrections of this step at the two limits */
-    /* Path lengths before which a link or an angle cannot reach a limit, and a place cannot touch. */
-    double *link_wake, *angle_wake, *touch_wake;
+    /* Spans are joints, links, skin triangles and posts. Each one's path is the sum over the steps of how far
+     * the fastest of its corners moved, its move how far in this step, m; lift_path the same of the target.
+     */
+    double *path, *move, lift_path;
+    int (*angle_ends)[4]; /* of both arms */
+    /* Path lengths, of links by the sum of their ends', of angles by that of all ends of both arms, before
+     * which a link or an angle cannot reach a limit; of places by their span's and the target's, before which
+     * they cannot touch; of spans, the least of their places'. */
+    double *link_wake, *angle_wake, *touch_wake, *span_wake;
+    int *first_touch;            /* spans but posts, and one more */
     int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
     int near_links, near_angles;
     /* Of them and of the contacts those that the last complete sweep found at work or nearly so. */
     int *hot_link, *hot_angle, *hot_contact;
     int hot_links, hot_angles, hot_contacts;
     bool hot_backward; /* listed in a backward sweep */
-    double stirred;    /* largest motion by a correction in the last sweep, m */
+    double added;   /* what sweeps may add to the motion of a step or a frame, m: what is nearer is listed */
+    double stirred; /* largest motion by a correction in the last sweep, m */
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
     morph_blanket_self *self;
@@ -151,9 +169,9 @@ typedef struct morph_blanket_state {
     int *held, holds;       /* sources whose hold is not 0 */
     /* Polishing a frame works on these copies' originals and puts them back. */
     double (*spare_push)[2];
-    morph_angle *spare_angle;
+    double (*spare_angle)[2]; /* pushes */
     morph_touch *spare_touch;
-    double *spare_wake; /* touch_wake */
+    double *spare_wake; /* touch_wake, span_wake */
 } morph_blanket_state;
 
 /* sdf may be NULL (no target). Validates def; x0 is copied. */
@@ -187,12 +205,19 @@ void morph_blanket_schedule(morph_blanket_state *b);
 /* Lift of the target after it has risen for `clock` seconds, m. */
 double morph_blanket_lift(const morph_blanket_def *def, double clock);
 
+/* blanket_path.c */
+morph_status morph_blanket_paths_create(morph_blanket_state *b);
+/* How far every span moved from `before` to x, and from that what sweeps may add; returns the longest, m. */
+double morph_blanket_note_moves(morph_blanket_state *b, const double *x);
+/* Adds the step from `before` to b->x to the paths. */
+void morph_blanket_add_paths(morph_blanket_state *b);
+
 /* blanket_project.c */
 morph_status morph_blanket_limits_create(morph_blanket_state *b);
-/* Lists the lengths and angles that can reach a limit while joints move by up to `move` and what sweeps add.
- * What is far is not looked at again before the joints have moved enough; `all`: look at every one, whatever
- * was noted, and note nothing. */
-void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all);
+/* Lists the lengths and angles that can reach a limit while sweeps take back a step's moves (as last noted)
+ * and add what they may. What is far is not looked at again before its joints have moved enough; `all`: look
+ * at every one, whatever was noted, as if nothing had moved, and note nothing. */
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all);
 /* Applies `warm` times the corrections of the last step to x (0: forgets them): at rest every step needs the
  * same ones, so that a few sweeps a step converge over many steps. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
@@ -231,8 +256,8 @@ void morph_blanket_fix_apply(morph_blanket_state *b, double *x);
 morph_status morph_blanket_self_create(const morph_structure *s, morph_blanket_self **out);
 void morph_blanket_self_destroy(morph_blanket_self *self); /* NULL allowed */
 void morph_blanket_self_forget(morph_blanket_self *self);
-/* Lists the pairs of links and posts that can meet while joints move by up to `move` from `before`. */
-morph_status morph_blanket_find_self(morph_blanket_state *b, double move);
+/* Lists the pairs of links and posts that can meet in a step with the moves last noted. */
+morph_status morph_blanket_find_self(morph_blanket_state *b);
 /* Returns the longest motion that a correction gives a joint, m. */
 double morph_blanket_project_self(morph_blanket_state *b, double *x, bool backward);
 int morph_blanket_self_count(const morph_blanket_state *b); /* contacts listed in the last step */
@@ -241,6 +266,8 @@ int morph_blanket_self_count(const morph_blanket_state *b); /* contacts listed i
 morph_status morph_blanket_touches_create(morph_blanket_state *b);
 /* After x was set from outside: forgets what is far, and the last step's corrections. */
 void morph_blanket_forget(morph_blanket_state *b);
+/* Whether a place is known to be too far to touch. */
+bool morph_blanket_sleeps(const morph_blanket_state *b, int touch);
 /* Longest motion of a joint from `before` to x, m. */
 double morph_blanket_moved(const morph_blanket_state *b, const double *x);
 /* Lists the contacts near x; `before` in the state is where friction counts from. */
@@ -252,6 +279,9 @@ double morph_blanket_depth(const morph_blanket_state *b, const double *x);
 /* The same by exact distances over whole links and triangles. An element that has moved less than its last
  * distance left over and half of what counts as held is not measured again: its bound counts. */
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
+/* At least how far an element is from the target beyond its radius, by its last exact distance: corners as
+ * the target sees them. Negative infinity where nothing is known. */
+double morph_blanket_gap_bound(const morph_blanket_state *b, int element, const double v[3][3]);
 /* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
  * between the fixed places is then felt by the steps that follow. */
 void morph_blanket_seek_deepest(morph_blanket_state *b);

@@ -17,8 +17,8 @@
 #define EXACT_ROUNDS 12
 /* Rounds that try equalities alone where no contact is broken. */
 #define ALONE 2
-/* Of lengths, posts, panels and angles at x. */
-static morph_violation member_violation(const morph_blanket_state *b, const double *x) {
+/* Of lengths, posts, panels and, if asked for, angles at x. */
+static morph_violation member_violation(const morph_blanket_state *b, const double *x, bool angles) {
     const morph_structure *s = b->structure;
     morph_violation worst = {.link = -1, .tuple = -1};
     for (int l = 0; l < b->links; l++) {
@@ -34,7 +34,7 @@ static morph_violation member_violation(const morph_blanket_state *b, const doub
     }
     for (int p = 0; p < s->panels; p++)
         worst.panel = fmax(worst.panel, fabs(morph_blanket_panel_sine(s, p, x)));
-    for (int t = 0; t < b->angles; t++) {
+    for (int t = 0; t < b->angles && angles; t++) {
         const double c = morph_blanket_cosine(&b->angle[t], x);
         const double over = fmax(b->angle[t].lowest - c, c - b->angle[t].highest);
         if (over <= worst.angle) continue;
@@ -52,7 +52,7 @@ static bool held(const morph_blanket_state *b, const morph_violation *v) {
 }
 
 morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x) {
-    morph_violation v = member_violation(b, x);
+    morph_violation v = member_violation(b, x, true);
     v.clearance = morph_blanket_depth(b, x);
     return v;
 }
@@ -60,7 +60,9 @@ morph_violation morph_blanket_violation(const morph_blanket_state *b, const doub
 static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int rounds) {
     double before = INFINITY;
     for (int round = 0;; round++) {
-        morph_violation v = exact ? member_violation(b, x) : morph_blanket_violation(b, x);
+        /* Angles are asked for only where a target rises. */
+        morph_violation v = member_violation(b, x, b->def.rise > 0.0);
+        if (!exact) v.clearance = morph_blanket_depth(b, x);
         if (exact) v.clearance = morph_blanket_depth_exact(b, x);
         if (exact && round == 0) b->entered = v.clearance > ENTERED * b->structure->spacing;
         if (held(b, &v) || round == rounds) return v;
@@ -78,7 +80,9 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
             morph_blanket_find_exact(b, x);
         else
             morph_blanket_find_contacts(b, x);
-        morph_blanket_list_limits(b, x, 0.0, true);
+        b->added =
+            fmin(v.length + v.clearance + MORPH_BLANKET_ADD * spacing, MORPH_BLANKET_ADD_MOST * spacing);
+        morph_blanket_list_limits(b, x, true);
         morph_blanket_project_start(b, x, 0.0);
         for (int sweep = 0; sweep < SWEEPS; sweep++)
             morph_blanket_sweep(b, x, sweep, 0.0);
@@ -87,22 +91,31 @@ static morph_violation polish(morph_blanket_state *b, double *x, bool exact, int
 }
 
 morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
-    const size_t push = (size_t)b->links * sizeof *b->push, angle = (size_t)b->angles * sizeof *b->angle,
-                 touch = (size_t)b->touches * sizeof *b->touch,
-                 wake = (size_t)b->touches * sizeof *b->touch_wake;
+    const size_t push = (size_t)b->links * sizeof *b->push, touch = (size_t)b->touches * sizeof *b->touch,
+                 wake = (size_t)b->touches * sizeof *b->touch_wake,
+                 spans = (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake;
     memcpy(b->spare_push, b->push, push);
-    memcpy(b->spare_angle, b->angle, angle);
-    memcpy(b->spare_touch, b->touch, touch);
-    memcpy(b->spare_wake, b->touch_wake, wake);
+    for (int t = 0; t < b->angles; t++)
+        memcpy(b->spare_angle[t], b->angle[t].push, sizeof *b->spare_angle);
+    const bool exact = b->exact && (b->sdf || b->soft);
+    /* By exact distances no place moves and none falls asleep. */
+    if (!exact) {
+        memcpy(b->spare_touch, b->touch, touch);
+        memcpy(b->spare_wake, b->touch_wake, wake);
+        memcpy(b->spare_wake + b->touches, b->span_wake, spans);
+    }
     memcpy(b->before, x, 3 * (size_t)b->joints * sizeof(double));
     if (b->soft) morph_blanket_soft_hold(b);
-    const bool exact = b->exact && (b->sdf || b->soft);
     const morph_violation v = polish(b, x, exact, exact ? EXACT_ROUNDS : ROUNDS);
     if (b->soft) morph_blanket_soft_release(b);
     memcpy(b->push, b->spare_push, push);
-    memcpy(b->angle, b->spare_angle, angle);
-    memcpy(b->touch, b->spare_touch, touch);
-    memcpy(b->touch_wake, b->spare_wake, wake);
+    for (int t = 0; t < b->angles; t++)
+        memcpy(b->angle[t].push, b->spare_angle[t], sizeof *b->spare_angle);
+    if (!exact) {
+        memcpy(b->touch, b->spare_touch, touch);
+        memcpy(b->touch_wake, b->spare_wake, wake);
+        memcpy(b->span_wake, b->spare_wake + b->touches, spans);
+    }
     if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }

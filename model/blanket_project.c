@@ -9,12 +9,12 @@
 #define LENGTH_MARGIN 1e-3 /* spacings */
 #define ANGLE_MARGIN 0.01  /* radians */
 
-/* What sweeps may move a joint by beyond its step, spacings: limits closer than that are listed. */
-#define SWEEPS_ADD 0.02
-
 /* Rows closer to their limits than this are looked at in every sweep: what a sweep moves. */
 #define HOT_LENGTH 0.005 /* spacings */
 #define HOT_COSINE 0.01
+/* Rows whose correction moves no joint further than this, spacings, are left alone until the next complete
+ * sweep: a hundredth of the limits' margins. */
+#define STILL 1e-5
 /* Every so many sweeps one is complete. */
 #define COMPLETE 6
 
@@ -62,13 +62,15 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
     b->spare_push = morph_alloc((size_t)b->links, sizeof *b->spare_push);
     b->spare_angle = morph_alloc((size_t)b->angles, sizeof *b->spare_angle);
+    b->angle_ends = morph_alloc((size_t)b->angles, sizeof *b->angle_ends);
     b->link_wake = morph_alloc((size_t)b->links, sizeof *b->link_wake);
     b->near_link = morph_alloc((size_t)b->links, sizeof *b->near_link);
     b->near_angle = morph_alloc((size_t)b->angles, sizeof *b->near_angle);
     b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
     b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
     b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
-    if (!b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake || !b->hot_link || !b->hot_angle)
+    if (!b->angle_ends || !b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake ||
+        !b->hot_link || !b->hot_angle)
         return MORPH_ERR_NOMEM;
     if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
         return MORPH_ERR_NOMEM;
@@ -89,6 +91,9 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
         morph_link_link_joints(s, t, uj, vj);
         set_angle(&b->angle[n++], uj, vj, s->link_link_limit[t]);
     }
+    for (int t = 0; t < n; t++)
+        for (int k = 0; k < 4; k++)
+            b->angle_ends[t][k] = k < 2 ? b->angle[t].u[k] : b->angle[t].v[k - 2];
     for (int t = 0; t < n; t++)
         for (int k = 0; k < b->angle[t].joints; k++)
             b->angle[t].weight[k] = b->weight[b->angle[t].joint[k]];
@@ -151,13 +156,14 @@ static double unilateral(double *push, double gap) {
 }
 
 /* True if the next sweeps must look at it too. */
-static bool project_length(morph_blanket_state *b, int l, double *x) {
+static bool project_length(morph_blanket_state *b, int l, double *x, double *motion) {
     const int *ends = b->structure->link[l];
     const double *limit = b->limit[l];
     double *xi = &x[3 * ends[0]], *xj = &x[3 * ends[1]], *push = b->push[l], d[3];
     morph_sub(xj, xi, d);
     const double square = morph_dot(d, d);
     const double hot = HOT_LENGTH * b->structure->spacing;
+    *motion = 0.0;
     if (push[0] == 0.0 && push[1] == 0.0 && square > squared(limit[0]) && square < squared(limit[1]))
         return square < squared(limit[0] + hot) || square > squared(fmax(0.0, limit[1] - hot));
     const double length = sqrt(square);
@@ -165,6 +171,7 @@ static bool project_length(morph_blanket_state *b, int l, double *x) {
     double grow = unilateral(&push[0], length - limit[0]);
     if (push[0] == 0.0) grow -= unilateral(&push[1], limit[1] - length);
     note(b, grow);
+    *motion = grow;
     if (grow != 0.0) part(b, ends, xi, xj, d, grow / length);
     return true;
 }
@@ -216,55 +223,59 @@ double morph_blanket_cosine(const morph_angle *a, const double *x) {
     return c;
 }
 
-/* A length changes by at most twice what its joints move. */
-static bool link_near(morph_blanket_state *b, int l, const double *x, double near, bool note) {
+/* A length changes by at most what its two ends move. Both what they moved by in this step and what sweeps
+ * may add counts against it. */
+static bool link_near(morph_blanket_state *b, int l, const double *x, double near, double path, bool note) {
     const int *ends = b->structure->link[l];
     const double length = morph_dist(&x[3 * ends[0]], &x[3 * ends[1]]);
-    const double spare = 0.5 * fmin(length - b->limit[l][0], b->limit[l][1] - length) - near;
-    if (note && spare > 0.0) b->link_wake[l] = b->path + spare;
+    const double low = length - b->limit[l][0], high = b->limit[l][1] - length;
+    const double spare = (low < high ? low : high) - near;
+    if (note && spare > 0.0) b->link_wake[l] = path + spare;
     return !(spare > 0.0);
 }
 
-/* With joints moving by m, arms of length a turn by at most 2 m / (a - 2 m) each and the cosine changes by at
- * most their sum: it keeps a distance g where m <= g a / (4 + 2 g). */
+/* With the ends of an arm of length a moving by m in all, it turns by at most m / (a - m); the cosine changes
+ * by at most the sum of both turns: with m for both it keeps a distance g where m <= g a / (1 + g). */
 static bool angle_near(const morph_blanket_state *b, morph_angle *a, const double *x, double near,
-                       bool note) {
+                       double path, bool note) {
     double u[3], v[3];
     arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     if (!(scale > 0.0)) return true;
-    const double c = morph_dot(u, v) / scale, gap = fmin(a->ceiling - c, c - a->floor);
-    const double spare = gap * sqrt(fmin(uu, vv)) / (4.0 + 2.0 * fmax(gap, 0.0)) - near;
-    if (note && spare > 0.0) b->angle_wake[a - b->angle] = b->path + spare;
+    const double c = morph_dot(u, v) / scale, high = a->ceiling - c, low = c - a->floor;
+    const double gap = high < low ? high : low;
+    if (!(gap > 0.0)) return true;
+    const double spare = gap * sqrt(uu < vv ? uu : vv) / (1.0 + gap) - near;
+    if (note && spare > 0.0) b->angle_wake[a - b->angle] = path + spare;
     return !(spare > 0.0);
 }
 
-/* What a step moved the given joints by: sweeps take back at most that, and add what they may. */
-static double own_move(const morph_blanket_state *b, const double *x, const int *joint, int joints) {
-    double most = 0.0, d[3];
-    for (int k = 0; k < joints; k++) {
-        morph_sub(&x[3 * joint[k]], &b->before[3 * joint[k]], d);
-        most = fmax(most, morph_dot(d, d));
-    }
-    return sqrt(most);
-}
-
-void morph_blanket_list_limits(morph_blanket_state *b, const double *x, double move, bool all) {
-    const double add = SWEEPS_ADD * b->structure->spacing, near = add + move;
-    b->near_links = b->near_angles = 0;
+static void list_links(morph_blanket_state *b, const double *x, double add, bool all) {
+    const double *path = b->path, *move = b->move;
+    b->near_links = 0;
     for (int l = 0; l < b->links; l++) {
-        if (!all && b->path + near < b->link_wake[l]) continue;
-        const double own = all ? add : add + own_move(b, x, b->structure->link[l], 2);
-        if (b->def.drive || link_near(b, l, x, own, !all))
+        const int *e = b->structure->link[l];
+        const double been = path[e[0]] + path[e[1]], near = 2.0 * add + (all ? 0.0 : move[e[0]] + move[e[1]]);
+        if (!all && been + near < b->link_wake[l]) continue;
+        if (b->def.drive || link_near(b, l, x, near, been, !all))
             b->near_link[b->near_links++] = l;
         else
             b->push[l][0] = b->push[l][1] = 0.0;
     }
+}
+
+void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all) {
+    const double add = b->added, *path = b->path, *move = b->move;
+    list_links(b, x, add, all);
+    b->near_angles = 0;
     for (int t = 0; t < b->angles; t++) {
-        if (!all && b->path + near < b->angle_wake[t]) continue;
+        const int *e = b->angle_ends[t];
+        const double been = path[e[0]] + path[e[1]] + path[e[2]] + path[e[3]];
+        const double own = all ? 0.0 : move[e[0]] + move[e[1]] + move[e[2]] + move[e[3]];
+        const double near = 4.0 * add + own;
+        if (!all && been + near < b->angle_wake[t]) continue;
         morph_angle *a = &b->angle[t];
-        const double own = all ? add : add + own_move(b, x, a->joint, a->joints);
-        if (angle_near(b, a, x, own, !all))
+        if (angle_near(b, a, x, near, been, !all))
             b->near_angle[b->near_angles++] = t;
         else
             a->push[0] = a->push[1] = 0.0;
@@ -297,23 +308,44 @@ static bool at_work(const morph_angle *a) {
     return a->push[0] != 0.0 || a->push[1] != 0.0;
 }
 
+/* Moves the joints by what an angle of cosine c asks for; longest motion by the correction. */
+static double correct_angle(morph_angle *a, double *x, double c) {
+    double change = unilateral(&a->push[0], clip((c - a->floor) * a->inverse, a->most));
+    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) * a->inverse, a->most));
+    if (change != 0.0) turn(a, x, (const double(*)[3])a->grad, change);
+    return change * a->size;
+}
+
+/* Between complete sweeps the cosine is taken as linear: joints move by fractions of HOT_LENGTH (or all
+ * sweeps are complete), over which its second derivatives, at most 4 / arm^2, change it by less than 1e-4. */
+static double linear_angle(morph_angle *a, double *x) {
+    double c = a->level;
+    for (int j = 0; j < a->joints; j++)
+        c += morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    return at_work(a) || c < a->floor || c > a->ceiling ? correct_angle(a, x, c) : 0.0;
+}
+
 /* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
  * the shorter arm. *motion: longest by the correction. True if the next sweeps must look at it too. */
 static bool project_angle(morph_angle *a, double *x, double *motion) {
-    double c, arm, grad[4][3], u[3], v[3];
+    double c, arm, u[3], v[3];
     *motion = 0.0;
+    a->linear = false;
     if (!at_work(a)) {
         arms(a, x, u, v);
         if (cosine_within(u, v, a->floor + HOT_COSINE, a->ceiling - HOT_COSINE)) return false;
         if (cosine_within(u, v, a->floor, a->ceiling)) return true;
     }
-    const double square = cosine(a, x, &c, grad, &arm);
+    const double square = cosine(a, x, &c, a->grad, &arm);
     if (square == 0.0) return true;
-    const double most = 0.5 * arm / sqrt(square);
-    double change = unilateral(&a->push[0], clip((c - a->floor) / square, most));
-    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) / square, most));
-    turn(a, x, (const double(*)[3])grad, change);
-    *motion = change * sqrt(square);
+    a->size = sqrt(square);
+    a->inverse = 1.0 / square;
+    a->most = 0.5 * arm / a->size;
+    a->linear = true;
+    a->level = c;
+    for (int j = 0; j < a->joints; j++)
+        a->level -= morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    *motion = correct_angle(a, x, c);
     return true;
 }
 
@@ -414,33 +446,60 @@ static void sweep_complete(morph_blanket_state *b, double *x, bool backward) {
     }
     for (int l = 0; l < b->near_links; l++) {
         const int link = b->near_link[backward ? b->near_links - 1 - l : l];
-        if (project_length(b, link, x)) b->hot_link[b->hot_links++] = link;
+        if (project_length(b, link, x, &motion)) b->hot_link[b->hot_links++] = link;
     }
 }
 
-/* Lists made in a backward sweep run the other way. */
+/* Keeps the order of a list when its rows were looked at from the end. */
+static int close_up(int *list, int length, int kept, bool backward) {
+    if (backward && kept < length) memmove(list, list + length - kept, (size_t)kept * sizeof *list);
+    return kept;
+}
+
+/* Lists made in a backward sweep run the other way. What a row's correction no longer moves by more than
+ * `still` is done until the next complete sweep. */
 static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
-    double motion;
+    const double still = STILL * b->structure->spacing;
+    int kept = 0;
     for (int t = 0; t < b->hot_angles; t++) {
-        project_angle(&b->angle[b->hot_angle[backward ? b->hot_angles - 1 - t : t]], x, &motion);
+        const int at = backward ? b->hot_angles - 1 - t : t, angle = b->hot_angle[at];
+        morph_angle *a = &b->angle[angle];
+        double motion;
+        if (a->linear)
+            motion = linear_angle(a, x);
+        else
+            project_angle(a, x, &motion);
         note(b, motion);
+        if (fabs(motion) > still) b->hot_angle[backward ? b->hot_angles - 1 - kept++ : kept++] = angle;
     }
-    for (int l = 0; l < b->hot_links; l++)
-        project_length(b, b->hot_link[backward ? b->hot_links - 1 - l : l], x);
+    b->hot_angles = close_up(b->hot_angle, b->hot_angles, kept, backward);
+    kept = 0;
+    for (int l = 0; l < b->hot_links; l++) {
+        const int at = backward ? b->hot_links - 1 - l : l, link = b->hot_link[at];
+        double motion;
+        project_length(b, link, x, &motion);
+        if (fabs(motion) > still) b->hot_link[backward ? b->hot_links - 1 - kept++ : kept++] = link;
+    }
+    b->hot_links = close_up(b->hot_link, b->hot_links, kept, backward);
 }
 
 static void sweep_contacts(morph_blanket_state *b, double *x, bool complete, bool backward, double friction) {
-    const double hot = HOT_LENGTH * b->structure->spacing;
+    const double hot = HOT_LENGTH * b->structure->spacing, still = STILL * b->structure->spacing;
     for (int n = 0; n < b->contacts && complete; n++) {
         double gap;
         const int contact = backward ? b->contacts - 1 - n : n;
         note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, &gap));
         if (gap < hot || b->contact[contact].push > 0.0) b->hot_contact[b->hot_contacts++] = contact;
     }
-    for (int n = 0; n < b->hot_contacts && !complete; n++) {
+    if (complete) return;
+    int kept = 0;
+    for (int n = 0; n < b->hot_contacts; n++) {
         const int contact = b->hot_contact[backward ? b->hot_contacts - 1 - n : n];
-        note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, NULL));
+        const double motion = morph_blanket_project_contact(&b->contact[contact], x, friction, NULL);
+        note(b, motion);
+        if (motion > still) b->hot_contact[backward ? b->hot_contacts - 1 - kept++ : kept++] = contact;
     }
+    b->hot_contacts = close_up(b->hot_contact, b->hot_contacts, kept, backward);
 }
 
 /* Angles first and posts last: what comes last holds best. Posts are exact, contacts and lengths must hold,
@@ -503,8 +562,10 @@ bool morph_blanket_sweep_lengths(morph_blanket_state *b, double *x) {
             if (lengths_hold(b, x)) return true;
             list_lengths(b, x);
         }
-        for (int l = 0; l < b->near_links; l++)
-            project_length(b, b->near_link[sweep & 1 ? b->near_links - 1 - l : l], x);
+        for (int l = 0; l < b->near_links; l++) {
+            double motion;
+            project_length(b, b->near_link[sweep & 1 ? b->near_links - 1 - l : l], x, &motion);
+        }
         project_posts(b, x);
     }
     return lengths_hold(b, x);

@@ -30,9 +30,10 @@ struct morph_blanket_self {
     double *radius;
     morph_box *box;
     int (*pair)[2];
-    double *pair_wake; /* path length before which the pair cannot meet */
+    double *pair_wake; /* sum of both bars' paths before which the pair cannot meet */
     self_contact *contact;
-    double wake; /* path length (state.path) from which the pairs must be found anew */
+    double *found; /* joints where the pairs were found */
+    bool known;
 };
 
 morph_status morph_blanket_self_create(const morph_structure *s, morph_blanket_self **out) {
@@ -43,7 +44,8 @@ morph_status morph_blanket_self_create(const morph_structure *s, morph_blanket_s
     c->bar = morph_alloc((size_t)c->bars, sizeof *c->bar);
     c->radius = morph_alloc((size_t)c->bars, sizeof *c->radius);
     c->box = morph_alloc((size_t)c->bars, sizeof *c->box);
-    if (!c->bar || !c->radius || !c->box || morph_hash_create(&c->hash) != MORPH_OK) {
+    c->found = morph_alloc(3 * (size_t)s->joints, sizeof *c->found);
+    if (!c->bar || !c->radius || !c->box || !c->found || morph_hash_create(&c->hash) != MORPH_OK) {
         morph_blanket_self_destroy(c);
         return MORPH_ERR_NOMEM;
     }
@@ -64,11 +66,12 @@ void morph_blanket_self_destroy(morph_blanket_self *c) {
     free(c->pair);
     free(c->pair_wake);
     free(c->contact);
+    free(c->found);
     free(c);
 }
 
 void morph_blanket_self_forget(morph_blanket_self *c) {
-    c->wake = 0.0;
+    c->known = false;
     c->contacts = 0;
 }
 
@@ -89,8 +92,7 @@ static morph_status reserve(morph_blanket_self *c, int pairs) {
     return c->room > 0 ? MORPH_OK : MORPH_ERR_NOMEM;
 }
 
-/* Pairs whose grown boxes meet; what is left out is at least twice the margin beyond touching, and each bar
- * moves at most by the path. */
+/* Pairs whose grown boxes meet; what is left out is at least twice the margin beyond touching. */
 static morph_status find_pairs(morph_blanket_state *b, const double *x) {
     morph_blanket_self *c = b->self;
     const double margin = MARGIN * b->structure->spacing;
@@ -107,7 +109,8 @@ static morph_status find_pairs(morph_blanket_state *b, const double *x) {
             c->pair_wake[c->pairs] = 0.0;
             memcpy(c->pair[c->pairs++], found[k], sizeof *c->pair);
         }
-    c->wake = b->path + margin;
+    memcpy(c->found, x, 3 * (size_t)b->joints * sizeof *x);
+    c->known = true;
     return MORPH_OK;
 }
 
@@ -153,21 +156,43 @@ static bool set_contact(const morph_blanket_state *b, const int pair[2], double 
     return true;
 }
 
-morph_status morph_blanket_find_self(morph_blanket_state *b, double move) {
+/* Bars come nearer by no more than what their joints have moved otherwise than the blanket as a whole. */
+static bool outdated(const morph_blanket_state *b) {
+    const morph_blanket_self *c = b->self;
+    const double margin = MARGIN * b->structure->spacing;
+    double mean[3] = {0.0};
+    if (!c->known) return true;
+    for (int k = 0; k < 3 * b->joints; k++)
+        mean[k % 3] += (b->before[k] - c->found[k]) / b->joints;
+    for (int j = 0; j < b->joints; j++) {
+        double d[3];
+        for (int k = 0; k < 3; k++)
+            d[k] = b->before[3 * j + k] - c->found[3 * j + k] - mean[k];
+        if (!(morph_norm(d) + b->move[j] < margin)) return true;
+    }
+    return false;
+}
+
+static int span_of(const morph_blanket_state *b, int bar) {
+    const int skin = b->structure->skin_triangles;
+    return b->joints + bar + (bar < b->links ? 0 : skin);
+}
+
+morph_status morph_blanket_find_self(morph_blanket_state *b) {
     morph_blanket_self *c = b->self;
     c->contacts = 0;
-    /* The pairs hold for what the bars move from where they were found: half the margin each, both sides. */
-    if (b->path + 2.0 * move >= c->wake) {
+    if (outdated(b)) {
         const morph_status status = find_pairs(b, b->before);
         if (status != MORPH_OK) return status;
     }
-    const double still = 0.5 * LISTED * b->structure->spacing, near = 2.0 * move + 2.0 * still;
+    const double still = LISTED * b->structure->spacing;
     for (int k = 0; k < c->pairs; k++) {
+        const int p = span_of(b, c->pair[k][0]), q = span_of(b, c->pair[k][1]);
+        const double been = b->path[p] + b->path[q], near = b->move[p] + b->move[q] + still;
         double by = 0.0;
-        if (b->path + move < c->pair_wake[k]) continue;
+        if (been + near < c->pair_wake[k]) continue;
         if (set_contact(b, c->pair[k], near, &by, &c->contact[c->contacts])) c->contacts++;
-        /* Both bars move by the path at most: listed from where less than near is left. */
-        c->pair_wake[k] = b->path + 0.5 * by - still;
+        c->pair_wake[k] = been + by;
     }
     return MORPH_OK;
 }

@@ -47,6 +47,7 @@ static morph_status allocate(morph_blanket_state *b) {
         b->weight[b->def.fixed[k]] = 0.0;
     morph_status status = morph_blanket_fix_create(b->structure, &b->fix);
     if (status == MORPH_OK) status = morph_blanket_self_create(b->structure, &b->self);
+    if (status == MORPH_OK) status = morph_blanket_paths_create(b);
     if (status == MORPH_OK) status = morph_blanket_limits_create(b);
     if (status == MORPH_OK) status = morph_blanket_touches_create(b);
     return status == MORPH_OK ? morph_blanket_soft_create(b) : status;
@@ -97,6 +98,11 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->link_wake);
     free(b->angle_wake);
     free(b->touch_wake);
+    free(b->span_wake);
+    free(b->first_touch);
+    free(b->angle_ends);
+    free(b->path);
+    free(b->move);
     free(b->hot_link);
     free(b->hot_angle);
     free(b->hot_contact);

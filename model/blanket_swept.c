@@ -201,10 +201,36 @@ void morph_blanket_guard_contacts(morph_blanket_state *b) {
     g->watched = kept;
 }
 
+/* No point of the element moves further than its corners, and the distance changes by no more than that: what
+ * was further from the target at the step's start, as its last exact distance tells, cannot have reached it;
+ * nor can what was on the outer side of a convex one's plane before and after. Failing that, the same by the
+ * distance of its middle now. */
+static bool out_of_reach(const morph_blanket_state *b, const element *e) {
+    const morph_structure *s = b->structure;
+    const double radius = e->number < b->links ? s->link_radius[e->number] : s->def.radius;
+    double move = 0.0, wide = 0.0, middle[3] = {0.0};
+    for (int i = 0; i < e->corners; i++) {
+        move = fmax(move, morph_dist(e->at[1][i], e->at[0][i]));
+        for (int k = 0; k < 3; k++)
+            middle[k] += e->at[0][i][k] / e->corners;
+    }
+    const double start = radius + morph_blanket_gap_bound(b, e->number, (const double(*)[3])e->at[0]);
+    if (start > move) return true;
+    if (b->convex && start > 0.0 &&
+        radius + morph_blanket_gap_bound(b, e->number, (const double(*)[3])e->at[1]) > 0.0)
+        return true;
+    for (int i = 0; i < e->corners; i++)
+        wide = fmax(wide, morph_dist(e->at[0][i], middle));
+    morph_closest at;
+    morph_distance_point_bounded(b->exact, middle, wide + move, &at);
+    return fabs(at.distance) >= wide + move;
+}
+
 /* What touches or is inside before the step is not for this guard: it may come out. */
 static bool crosses_rigid(morph_blanket_state *b, const element *e) {
     int near[MOST_NEAR];
     double lo[3], hi[3], first = INFINITY, weight[3];
+    if (out_of_reach(b, e)) return false;
     box_of(e, lo, hi);
     int found = morph_distance_box(b->exact, lo, hi, near, MOST_NEAR);
     if (found > MOST_NEAR) found = MOST_NEAR;

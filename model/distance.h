@@ -45,6 +45,11 @@ void morph_distance_triangle(const morph_distance *d, const double a[3], const d
 int morph_distance_box(const morph_distance *d, const double lo[3], const double hi[3], int *triangle,
                        int capacity);
 
+/* Whether the mesh is closed and no vertex lies above the plane of a triangle by more than rounding (1e-9 of
+ * the largest coordinate): the target is then all on one side of the plane through the closest point of
+ * anything outside, square to the way there. Takes some microseconds a triangle. */
+bool morph_distance_convex(const morph_distance *d);
+
 /* The same for an element of 2 or 3 corners with a hint: weight holds on entry the weights of a place on it
  * that may be near the nearest one (3 numbers, the unused 0). Where the least distance is beyond `enough` (m)
  * it may only be bounded: out->triangle is -1 then, out->distance a lower bound of at least `enough`, and the

@@ -1,4 +1,4 @@
-/* Triangles of a mesh near a box. */
+/* Triangles of a mesh near a box, and whether all of it lies beneath each of them. */
 #include "model/distance_internal.h"
 
 static bool overlap(const double alo[3], const double ahi[3], const double blo[3], const double bhi[3]) {
@@ -37,4 +37,41 @@ int morph_distance_box(const morph_distance *d, const double lo[3], const double
         }
     }
     return found;
+}
+
+/* Rounding of coordinates that facets of one plane may differ by, of the largest. */
+#define FLAT 1e-9
+
+/* Does a part of the mesh rise above the facet's plane? Boxes whose highest corner does not are passed over.
+ */
+static bool rises_above(const morph_distance *d, const morph_facet *f) {
+    const double norm = morph_norm(f->normal);
+    if (!(norm > 0)) return false;
+    const double level = morph_dot(f->normal, f->corner[0]) + FLAT * d->reach * norm;
+    int stack[MORPH_TREE_STACK], top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+        const morph_tree_node *n = &d->node[stack[--top]];
+        for (int side = 0; side < 2; side++) {
+            double highest = 0;
+            if (n->lo[side][0] > n->hi[side][0]) continue;
+            for (int k = 0; k < 3; k++)
+                highest += f->normal[k] * (f->normal[k] > 0 ? n->hi[side][k] : n->lo[side][k]);
+            if (!(highest > level)) continue;
+            if (n->count[side] == 0) {
+                stack[top++] = n->child[side];
+                continue;
+            }
+            for (int k = 0; k < 3 * n->count[side]; k++)
+                if (morph_dot(f->normal, d->facet[n->child[side] + k / 3].corner[k % 3]) > level) return true;
+        }
+    }
+    return false;
+}
+
+bool morph_distance_convex(const morph_distance *d) {
+    if (!d->closed) return false;
+    for (int i = 0; i < d->mesh.triangles; i++)
+        if (rises_above(d, &d->facet[i])) return false;
+    return true;
 }

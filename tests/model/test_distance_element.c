@@ -267,6 +267,23 @@ static void test_hinted_elements(void **state) {
     morph_mesh_free(&mesh);
 }
 
+/* A ball is convex, as an open surface it is not, nor with one vertex pushed in. */
+static void test_convex(void **state) {
+    (void)state;
+    const double radii[3] = {1.0, 0.7, 0.5};
+    morph_mesh mesh;
+    morph_distance *d;
+    assert_int_equal(morph_mesh_ellipsoid(radii, 0.01, &mesh), MORPH_OK);
+    for (int round = 0; round < 3; round++) {
+        for (int k = 0; k < 3 && round == 2; k++)
+            mesh.v[3 * (mesh.vertices / 2) + k] *= 0.95;
+        assert_int_equal(morph_distance_create(&mesh, round != 1, &d), MORPH_OK);
+        assert_int_equal(morph_distance_convex(d), round == 0);
+        morph_distance_destroy(d);
+    }
+    morph_mesh_free(&mesh);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_elements_against_brute_force),
@@ -276,6 +293,7 @@ int main(void) {
         cmocka_unit_test(test_element_wholly_inside),
         cmocka_unit_test(test_segment_pairs),
         cmocka_unit_test(test_hinted_elements),
+        cmocka_unit_test(test_convex),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
