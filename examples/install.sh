@@ -2,7 +2,7 @@
 # Touches nothing but packages; uses sudo only where the user is not root.
 
 morph_packages="build-essential cmake ninja-build pkg-config coinor-libipopt-dev libfcl-dev libopenblas-dev \
-liblapacke-dev libassimp-dev libyaml-dev libcairo2-dev libhdf5-dev libcjson-dev libsuitesparse-dev"
+liblapacke-dev libassimp-dev libyaml-dev libcairo2-dev libhdf5-dev libcjson-dev libsuitesparse-dev libnlopt-dev"
 
 # install_missing PACKAGE...
 install_missing() {

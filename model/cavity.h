@@ -55,6 +55,18 @@ morph_status morph_cavity_measure(const morph_cavity *cavity, const double *x, m
  * along each column; wider columns are taken where there would be more than 400,000. */
 morph_status morph_cavity_volume(const morph_cavity *cavity, const double *x, double cell, double *volume);
 
+/* A connected region of skin triangles whose gap is on average above a threshold. */
+typedef struct morph_cavity_region {
+    double at[3];        /* centroid of the space between skin and target (or base plane), m */
+    double volume, area; /* sum of A gap over its samples, m3; start area of its skin, m2 */
+    int triangle;        /* one of its skin triangles */
+} morph_cavity_region;
+
+/* The regions at x with gaps above `threshold` (m), largest first: the first `capacity` of them in region, all
+ * counted. Triangles that share an edge are connected. MORPH_ERR_NONFINITE, MORPH_ERR_NOMEM. */
+morph_status morph_cavity_regions(const morph_cavity *cavity, const double *x, double threshold, int capacity,
+                                  morph_cavity_region *region, int *count);
+
 /* For each exposed point the closest skin point: joints and weights (exposed entries each), distance. Arrays
  * are the caller's; any may be NULL. */
 morph_status morph_cavity_closest(const morph_cavity *cavity, const double *x, int (*joint)[3],

@@ -172,8 +172,10 @@ static int plan_into(const morph_scene *scene, const char *folder, const morph_j
                      char **json) {
     const morph_control control = {job->stop, job->progress, job->log, job->user};
     const morph_plan_options options = {
-        job->method && strcmp(job->method, "blanket") == 0 ? MORPH_METHOD_BLANKET : MORPH_METHOD_IPOPT,
-        &control, job->warning};
+        job->method && strcmp(job->method, "blanket") == 0 ? MORPH_METHOD_BLANKET
+        : job->method && strcmp(job->method, "nlopt") == 0 ? MORPH_METHOD_NLOPT
+                                                           : MORPH_METHOD_IPOPT,
+        &control, job->warning, NULL};
     char message[512] = "";
     morph_status status = morph_folder_probe(folder, job->overwrite, message, sizeof message);
     if (status != MORPH_OK) {

@@ -1,5 +1,7 @@
 #include "planner/compare_method.h"
 
+#include "planner/guide.h"
+#include "planner/placement.h"
 #include "planner/reference.h"
 
 #include <stdio.h>
@@ -8,6 +10,8 @@
 
 void morph_compare_shared_free(morph_compare_shared *shared) {
     morph_trajectory_free(&shared->nominal);
+    if (shared->placement) morph_placement_free(shared->placement);
+    free(shared->placement);
     for (int k = 0; k < MORPH_COMPARE_METHODS; k++)
         free(shared->end[k]);
     morph_workspace_free(&shared->work);
@@ -108,9 +112,82 @@ static bool refuse(const morph_compare_shared *sh, morph_compare_row *row) {
     return !morph_scene_supported(sh->scene, "ipopt", row->reason, sizeof row->reason);
 }
 
+/* The blanket under seeds beneath its own cavities. */
+static morph_status run_seeds(morph_compare_shared *sh, morph_compare_row *row) {
+    const double *end = sh->end[MORPH_COMPARE_BLANKET];
+    morph_attractor seed[1];
+    morph_trajectory t = {0};
+    int count = 0;
+    if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
+    const morph_scene *s = sh->scene;
+    const double unit = s->motion.gravity > 0.0 ? s->structure.mass * s->motion.gravity
+                                                : s->structure.stiffness * s->structure.spacing;
+    morph_status status = morph_seed_centres(&sh->work, end, unit, 1, seed, &count);
+    if (status == MORPH_OK) status = morph_guided_run(&sh->work, s, NULL, seed, count, sh->control, &t, NULL);
+    if (status == MORPH_OK && t.frames > 0)
+        status = morph_compare_take(sh, MORPH_COMPARE_SEEDS,
+                                    &t.x[(size_t)(t.frames - 1) * 3 * (size_t)t.joints], 0.0, row);
+    morph_trajectory_free(&t);
+    return status;
+}
+
+/* With and without gradients; the better of the two. */
+static morph_status run_nlopt(morph_compare_shared *sh, morph_compare_row *row) {
+    static const morph_placement_method methods[2] = {MORPH_PLACE_NLOPT_GRADIENT, MORPH_PLACE_NLOPT_FREE};
+    const double *end = sh->end[MORPH_COMPARE_BLANKET];
+    double least = INFINITY;
+    if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
+    morph_status status = MORPH_OK;
+    for (int k = 0; k < 2 && status == MORPH_OK; k++) {
+        morph_placement_options o = morph_placement_defaults();
+        morph_placement p;
+        o.control = sh->control;
+        o.method = methods[k];
+        status = morph_placement_run(&sh->work, sh->scene, end, &o, &p);
+        const morph_trajectory *t = &p.guided;
+        if ((status == MORPH_OK || status == MORPH_ERR_STOPPED) && t->frames > 0 &&
+            p.reached.objective < least) {
+            least = p.reached.objective;
+            const morph_status taken = morph_compare_take(
+                sh, MORPH_COMPARE_NLOPT, &t->x[(size_t)(t->frames - 1) * 3 * (size_t)t->joints], 0.0, row);
+            if (taken != MORPH_OK) status = taken;
+        } else if (status == MORPH_OK && t->frames == 0) {
+            snprintf(row->reason, sizeof row->reason, "%s", p.reason);
+            status = MORPH_ERR_INPUT;
+        }
+        morph_placement_free(&p);
+    }
+    return status;
+}
+
+/* Kept for the plan, which would place the same centres again. */
+static morph_status run_guided(morph_compare_shared *sh, morph_compare_row *row) {
+    const double *end = sh->end[MORPH_COMPARE_BLANKET];
+    if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
+    morph_placement_options o = morph_placement_defaults();
+    o.control = sh->control;
+    morph_placement *p = calloc(1, sizeof *p);
+    if (!p) return MORPH_ERR_NOMEM;
+    const morph_status ran = morph_placement_run(&sh->work, sh->scene, end, &o, p);
+    if (ran != MORPH_OK && ran != MORPH_ERR_STOPPED) {
+        free(p);
+        return ran;
+    }
+    sh->placement = p;
+    const morph_trajectory *t = &p->guided;
+    if (t->frames == 0) {
+        snprintf(row->reason, sizeof row->reason, "%s", p->reason);
+        return ran == MORPH_OK ? MORPH_ERR_INPUT : ran;
+    }
+    const morph_status status = morph_compare_take(
+        sh, MORPH_COMPARE_GUIDED, &t->x[(size_t)(t->frames - 1) * 3 * (size_t)t->joints], 0.0, row);
+    return status == MORPH_OK ? ran : status;
+}
+
 /* The whole command as `plan` has it, its own blanket included. */
 static morph_status run_plan(morph_compare_shared *sh, morph_compare_row *row) {
-    const morph_plan_options options = {.method = MORPH_METHOD_IPOPT, .control = sh->control};
+    const morph_plan_options options = {
+        .method = MORPH_METHOD_IPOPT, .control = sh->control, .placement = sh->placement};
     const size_t width = 3 * (size_t)sh->work.structure->joints;
     morph_plan *plan = NULL;
     if (refuse(sh, row)) return MORPH_ERR_INPUT;
@@ -166,9 +243,9 @@ static morph_status run_reference(morph_compare_shared *sh, morph_compare_row *r
 
 const morph_compare_entry morph_compare_entries[MORPH_COMPARE_METHODS] = {
     [MORPH_COMPARE_BLANKET] = {"blanket", "pure blanket, at its end", "", run_blanket},
-    [MORPH_COMPARE_SEEDS] = {"seeds", "blanket with seed centres only", "", NULL},
-    [MORPH_COMPARE_NLOPT] = {"nlopt", "blanket under the centres that NLopt placed", "", NULL},
-    [MORPH_COMPARE_GUIDED] = {"guided", "blanket under the centres that Ipopt placed", "", NULL},
+    [MORPH_COMPARE_SEEDS] = {"seeds", "blanket with seed centres only", "", run_seeds},
+    [MORPH_COMPARE_NLOPT] = {"nlopt", "blanket under the centres that NLopt placed", "", run_nlopt},
+    [MORPH_COMPARE_GUIDED] = {"guided", "blanket under the centres that Ipopt placed", "", run_guided},
     [MORPH_COMPARE_PLAN] = {"plan", "full plan, at its end", "\"method\": \"ipopt\"", run_plan},
     [MORPH_COMPARE_REFERENCE] = {"reference", "no limits of length and angle: local, not a proven bound",
                                  "\"length\": [" TEXT_OF(MORPH_REFERENCE_SHORTEST) ", " TEXT_OF(

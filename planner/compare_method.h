@@ -16,7 +16,8 @@ typedef struct morph_compare_shared {
     morph_trajectory nominal; /* of the pure blanket; no frames without it */
     /* Where each method ended, seen with the target at its place: 3*joints, m; NULL: it did not. Owned. */
     double *end[MORPH_COMPARE_METHODS];
-    morph_compare_row *row; /* of all methods */
+    struct morph_placement *placement; /* of the guided blanket; owned, NULL without it */
+    morph_compare_row *row;            /* of all methods */
 } morph_compare_shared;
 
 typedef struct morph_compare_entry {

@@ -9,13 +9,17 @@
 #include "planner/summary.h"
 #include "planner/timing.h"
 
-typedef enum morph_method { MORPH_METHOD_IPOPT, MORPH_METHOD_BLANKET } morph_method;
+struct morph_placement;
+
+typedef enum morph_method { MORPH_METHOD_IPOPT, MORPH_METHOD_BLANKET, MORPH_METHOD_NLOPT } morph_method;
 
 typedef struct morph_plan_options {
     morph_method method;
     const morph_control *control;
     void (*warn)(void *user,
                  const char *line); /* the reach check's findings, with the control's user; NULL */
+    /* Centres that were placed for this scene already, with their run; NULL: the plan places its own. */
+    const struct morph_placement *placement;
 } morph_plan_options;
 
 typedef struct morph_plan {
@@ -58,6 +62,7 @@ morph_status morph_record_deformed(morph_record *r, const morph_mesh *surface);
 morph_status morph_record_nominal(morph_record *r, const morph_structure *s, const morph_trajectory *t);
 morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, const morph_timing *timing,
                                    double sample);
+morph_status morph_record_guided(morph_record *r, const morph_structure *s, const struct morph_placement *p);
 /* Frames of a replay, moved into *time and *joints; t keeps nothing of them. */
 void morph_record_replay(morph_trajectory *t, int *frames, double **time, double **joints);
 morph_status morph_record_mobility(morph_record *r, const morph_structure *s);

@@ -44,6 +44,12 @@ typedef struct morph_record {
     /* nominal/ */
     int nominal_frames;
     double *nominal_time, *nominal_joints, *nominal_lengths;
+    /* placement/: centres of attraction before and after, x, y, z [m], strength [N m2]; guided/: the blanket
+     * under them */
+    int centres_before, centres_after;
+    double (*placement_before)[4], (*placement_after)[4];
+    int guided_frames;
+    double *guided_time, *guided_joints, *guided_lengths;
     /* path/ */
     int poses, pose_width;       /* 6*posts, or 3*joints without posts */
     double *path_s, *path_poses; /* poses; poses x pose_width (centre and direction per post) */

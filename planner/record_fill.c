@@ -1,6 +1,6 @@
 /* From the stages' results to the record. */
 #include "model/kinematics.h"
-#include "planner/plan.h"
+#include "planner/placement.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -65,6 +65,32 @@ morph_status morph_record_nominal(morph_record *r, const morph_structure *s, con
         r->offset_nominal[3 * f + 2] = t->lift[f];
     for (int f = 0; f < t->frames; f++)
         morph_link_lengths(s, &t->x[(size_t)f * width], &r->nominal_lengths[(size_t)f * (size_t)s->links]);
+    return MORPH_OK;
+}
+
+static void put_centres(double (*to)[4], const morph_attractor *from, int count) {
+    for (int m = 0; m < count; m++) {
+        memcpy(to[m], from[m].at, sizeof from[m].at);
+        to[m][3] = from[m].strength;
+    }
+}
+
+morph_status morph_record_guided(morph_record *r, const morph_structure *s, const morph_placement *p) {
+    const morph_trajectory *t = &p->guided;
+    const size_t width = 3 * (size_t)s->joints, links = (size_t)s->links;
+    r->placement_before = morph_alloc((size_t)p->seeds, sizeof *r->placement_before);
+    r->placement_after = morph_alloc((size_t)p->centres, sizeof *r->placement_after);
+    r->guided_lengths = morph_alloc((size_t)t->frames, links * sizeof(double));
+    if (!r->placement_before || !r->placement_after || !r->guided_lengths ||
+        !COPY(r->guided_time, t->time, t->frames) || !COPY(r->guided_joints, t->x, (size_t)t->frames * width))
+        return MORPH_ERR_NOMEM;
+    r->centres_before = p->seeds;
+    r->centres_after = p->centres;
+    r->guided_frames = t->frames;
+    put_centres(r->placement_before, p->seed, p->seeds);
+    put_centres(r->placement_after, p->centre, p->centres);
+    for (int f = 0; f < t->frames; f++)
+        morph_link_lengths(s, &t->x[(size_t)f * width], &r->guided_lengths[(size_t)f * links]);
     return MORPH_OK;
 }
 

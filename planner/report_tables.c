@@ -31,7 +31,7 @@ static void sentence(morph_text *page, const char *tag, const char *plain) {
 
 void morph_report_outcome(morph_text *page, const morph_summary *s) {
     const char *what = "The run was stopped before a plan was found that holds every limit.";
-    const bool refined = strcmp(s->method, "blanket") != 0;
+    const bool refined = strcmp(s->method, "ipopt") == 0;
     if (s->feasible && !refined)
         what = "The blanket's own motion holds every limit. Nothing was refined.";
     else if (s->feasible && strcmp(s->outcome, "optimal") == 0)

@@ -10,8 +10,8 @@
 #include <string.h>
 
 const char *morph_stage_name(morph_stage stage) {
-    static const char *const names[MORPH_STAGES] = {"target",  "nominal", "refine", "path", "timing",
-                                                    "measure", "replay",  "check",  "write"};
+    static const char *const names[MORPH_STAGES] = {"target", "nominal", "placement", "refine", "path",
+                                                    "timing", "measure", "replay",    "check",  "write"};
     int k = (int)stage;
     return k >= 0 && k < MORPH_STAGES ? names[k] : "unknown";
 }
@@ -59,16 +59,19 @@ typedef struct measured {
     const char *name;
     const morph_measure *measure;
 } measured;
-enum { MEASURED = 5 };
+enum { MEASURED = 7 };
 
 /* The reference is not there unless somebody has asked for it. */
 static int list_measured(const morph_summary *s, measured list[MEASURED]) {
-    list[0] = (measured){"blanket", s->has_blanket ? &s->blanket : NULL};
-    list[1] = (measured){"plan", s->has_plan ? &s->plan : NULL};
-    list[2] = (measured){"replay", s->replay.done ? &s->replay.measure : NULL};
-    list[3] = (measured){"replay_core", s->replay_core.done ? &s->replay_core.measure : NULL};
-    list[4] = (measured){"reference", &s->reference};
-    return s->has_reference ? MEASURED : MEASURED - 1;
+    int n = 0;
+    list[n++] = (measured){"blanket", s->has_blanket ? &s->blanket : NULL};
+    if (s->has_guided) list[n++] = (measured){"seeds", &s->seeded};
+    if (s->has_guided) list[n++] = (measured){"guided", &s->guided};
+    list[n++] = (measured){"plan", s->has_plan ? &s->plan : NULL};
+    list[n++] = (measured){"replay", s->replay.done ? &s->replay.measure : NULL};
+    list[n++] = (measured){"replay_core", s->replay_core.done ? &s->replay_core.measure : NULL};
+    if (s->has_reference) list[n++] = (measured){"reference", &s->reference};
+    return n;
 }
 
 /* One number of each, by its place in the measure. */
@@ -154,6 +157,25 @@ static void put_solver(builder *b, cJSON *root, const morph_summary *s) {
 }
 
 /* Everything that differs from run to run stands here and in peak_memory_bytes. */
+static void put_placement(builder *b, cJSON *root, const morph_summary *s) {
+    const morph_placement_summary *p = &s->placement;
+    cJSON *o = put_object(b, root, "placement");
+    put_number(b, o, "seeds", p->seeds);
+    put_number(b, o, "centres", p->centres);
+    put_number(b, o, "rounds", p->rounds);
+    put_number(b, o, "accepted", p->accepted);
+    put_number(b, o, "iterations", p->iterations);
+    put_number(b, o, "unknowns", p->unknowns);
+    put_number(b, o, "rows", p->rows);
+    put_bool(b, o, "solved", p->solved);
+    put_bool(b, o, "stable", p->stable);
+    put_number(b, o, "residual", p->residual);
+    put_number(b, o, "complementarity", p->complementarity);
+    put_number(b, o, "difference", p->difference);
+    put_number(b, o, "largest_force", p->largest_force);
+    keep(b, cJSON_AddStringToObject(o, "reason", p->reason));
+}
+
 static void put_seconds(builder *b, cJSON *root, const morph_summary *s) {
     cJSON *seconds = put_object(b, root, "seconds");
     for (int k = 0; k < MORPH_STAGES; k++)
@@ -245,6 +267,7 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, mobility, "sigma_min", s->sigma_min);
     put_number(b, root, "duration", s->has_plan ? s->duration : (double)NAN);
     put_solver(b, root, s);
+    if (s->has_guided) put_placement(b, root, s);
     put_seconds(b, root, s);
     put_details(b, root, s);
 }

@@ -9,10 +9,11 @@
 #include "planner/replay.h"
 #include "planner/target_body.h"
 
-enum { MORPH_STAGES = 9 };
+enum { MORPH_STAGES = 10 };
 typedef enum morph_stage {
     MORPH_STAGE_TARGET,
     MORPH_STAGE_NOMINAL,
+    MORPH_STAGE_PLACEMENT,
     MORPH_STAGE_REFINE,
     MORPH_STAGE_PATH,
     MORPH_STAGE_TIMING,
@@ -23,6 +24,15 @@ typedef enum morph_stage {
 } morph_stage;
 const char *morph_stage_name(morph_stage stage); /* "target", "nominal", "refine", "path", ... */
 
+/* How centres of attraction were placed (planner/placement.h). Forces in weights of a joint, lengths in
+ * spacings. */
+typedef struct morph_placement_summary {
+    int seeds, centres, rounds, accepted, iterations, unknowns, rows;
+    bool solved, stable;
+    double residual, complementarity, difference, largest_force;
+    char reason[160];
+} morph_placement_summary;
+
 typedef struct morph_summary {
     char title[128], scene[256], method[16], level[16];
     char outcome[16];
@@ -30,6 +40,9 @@ typedef struct morph_summary {
     char reason[512]; /* why not feasible: constraint, element, time, amount; else empty */
     bool has_plan, has_blanket;
     morph_measure blanket, plan;
+    bool has_guided;
+    morph_measure seeded, guided; /* the blanket under the seeds, and under the centres placed */
+    morph_placement_summary placement;
     bool has_reference;
     morph_measure reference; /* without limits of length and angle; planner/reference.h */
     double target_volume;

@@ -58,6 +58,9 @@ morph_nlp_size morph_nlp_sizes(const morph_nlp *nlp);
  * for row multipliers of 1; for benchmarks and tests. */
 morph_status morph_nlp_evaluate(morph_nlp *nlp, const double *x, double *objective, double *rows);
 
+/* The objective blocks alone at x (unknowns): their sum, and its gradient (unknowns; may be NULL). */
+morph_status morph_nlp_objective(morph_nlp *nlp, const double *x, double *objective, double *gradient);
+
 /* First global row of a block, or -1 for an objective block. */
 int morph_nlp_first_row(const morph_nlp *nlp, int block);
 /* "clearance: link 17 (2,1)-(3,1) bottom" for a global row. */
@@ -80,6 +83,8 @@ typedef struct morph_nlp_options {
     double max_seconds; /* wall; <= 0: none */
     bool warm;          /* start from result's x and multipliers of a previous solve with the same shape */
     double mu_init;     /* <= 0: the library's */
+    double mu_target;   /* > 0: solve for this barrier parameter instead of 0: every active bound and row then
+                           has multiplier times slack = mu_target, and the last iterate is returned */
     bool adaptive_mu;
     /* Run the solver in a child process: then running out of memory inside it (which may end a process by a
      * signal or by an exit with code 0) is MORPH_ERR_BACKEND and not the end of the caller, and stop and

@@ -180,3 +180,12 @@ morph_status morph_nlp_evaluate(morph_nlp *nlp, const double *x, double *objecti
     if (rows) memcpy(rows, nlp->row_value, (size_t)nlp->rows * sizeof *rows);
     return MORPH_OK;
 }
+
+morph_status morph_nlp_objective(morph_nlp *nlp, const double *x, double *objective, double *gradient) {
+    morph_status status = morph_nlp_objective_at(nlp, x);
+    if (status == MORPH_OK && gradient) status = morph_nlp_gradient_at(nlp, x);
+    if (status != MORPH_OK) return status;
+    *objective = nlp->objective;
+    if (gradient) memcpy(gradient, nlp->gradient, (size_t)nlp->unknowns * sizeof *gradient);
+    return MORPH_OK;
+}

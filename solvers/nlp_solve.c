@@ -131,7 +131,7 @@ static candidate choose(morph_nlp *nlp, const morph_nlp_options *o, morph_run *r
     if (run->best_current >= 0)
         kept = recompute(nlp, morph_run_array(run, run->best_x[run->best_current]), o->violation_tolerance);
     bool take_last = last.x != NULL;
-    if (last.x && kept.x) {
+    if (last.x && kept.x && !(o->mu_target > 0)) {
         if (last.feasible != kept.feasible)
             take_last = last.feasible;
         else if (last.feasible)
@@ -218,7 +218,7 @@ static bool usable_options(const morph_nlp *nlp, const double *x0, const morph_n
                            const morph_nlp_result *result) {
     if (!(o->tolerance > 0) || !isfinite(o->tolerance) || !(o->violation_tolerance > 0) ||
         !isfinite(o->violation_tolerance) || o->max_iterations < 0 || isnan(o->max_seconds) ||
-        isnan(o->mu_init) || isinf(o->mu_init))
+        isnan(o->mu_init) || isinf(o->mu_init) || isnan(o->mu_target) || isinf(o->mu_target))
         return false;
     if (!o->warm) return x0 != NULL;
     return result->x && result->row_multiplier && result->lower_multiplier && result->upper_multiplier &&

@@ -170,8 +170,7 @@ static int take_option(int option, const char *value, arguments *a) {
         return value[0] ? 0 : usage_fault("-o", "empty", "a path");
     case O_METHOD:
         a->method = value;
-        if (strcmp(value, "nlopt") == 0) return not_yet("--method nlopt");
-        if (strcmp(value, "ipopt") != 0 && strcmp(value, "blanket") != 0)
+        if (strcmp(value, "ipopt") != 0 && strcmp(value, "nlopt") != 0 && strcmp(value, "blanket") != 0)
             return usage_fault("--method", value, "ipopt, blanket");
         return 0;
     case O_LEVEL:

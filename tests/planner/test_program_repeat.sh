@@ -9,7 +9,7 @@ fi
 mkdir "$work/clean" "$work/hostile" && cd "$work/clean" || exit 1
 touch "$work/out" "$work/err"
 
-expect 0 "$program" plan "$scene" -o "$work/first.plan" --quiet
+expect 0 "$program" plan "$placed" -o "$work/first.plan" --quiet
 if [ -s "$work/err" ]; then fault "--quiet is not quiet"; fi
 
 # Ipopt reads this file from the current folder, and it would win over values set in code.
@@ -22,7 +22,7 @@ mu_strategy monotone
 print_level 12
 output_file stray.txt
 OPT
-expect 0 "$program" plan "$scene" -o "$work/second.plan" --json
+expect 0 "$program" plan "$placed" -o "$work/second.plan" --json
 for file in plan.h5 schedule.csv; do
     holds "$file is the same" cmp "$work/first.plan/$file" "$work/second.plan/$file"
 done
@@ -51,7 +51,7 @@ expect 0 "$program" plan "$work/first.plan/scene.yaml" -o "$work/third.plan"
 holds "the scene of the folder repeats the plan" cmp "$work/first.plan/schedule.csv" "$work/third.plan/schedule.csv"
 
 # The pure blanket.
-run "$program" plan "$scene" --method blanket -o "$work/blanket.plan"
+run "$program" plan "$placed" --method blanket -o "$work/blanket.plan"
 case "$code" in
 0) holds "an outcome" grep -q '^outcome    feasible' "$work/out" ;;
 3)
