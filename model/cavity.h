@@ -62,8 +62,8 @@ typedef struct morph_cavity_region {
     int triangle;        /* one of its skin triangles */
 } morph_cavity_region;
 
-/* The regions at x with gaps above `threshold` (m), largest first: the first `capacity` of them in region, all
- * counted. Triangles that share an edge are connected. MORPH_ERR_NONFINITE, MORPH_ERR_NOMEM. */
+/* The regions at x with gaps above `threshold` (m), largest first: the first `capacity` of them in region,
+ * all counted. Triangles that share an edge are connected. MORPH_ERR_NONFINITE, MORPH_ERR_NOMEM. */
 morph_status morph_cavity_regions(const morph_cavity *cavity, const double *x, double threshold, int capacity,
                                   morph_cavity_region *region, int *count);
 
