@@ -97,7 +97,9 @@ morph_status morph_compare_run(const morph_scene *const *scene, int scenes, cons
         result->scene = scene[k];
         t.scene = k + 1;
         for (int m = 0; m < MORPH_COMPARE_METHODS; m++) {
-            result->row[m].listed = morph_compare_entries[m].run != NULL;
+            const morph_compare_entry *entry = &morph_compare_entries[m];
+            result->row[m].listed =
+                entry->run && !(entry->places && scene[k]->attractors == MORPH_ATTRACT_NONE);
             if (result->row[m].listed && morph_stopped(control)) mark(&result->row[m], MORPH_ERR_STOPPED);
         }
         if (!morph_stopped(control)) run_scene(result, &t);

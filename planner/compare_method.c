@@ -242,15 +242,15 @@ static morph_status run_reference(morph_compare_shared *sh, morph_compare_row *r
 #define TEXT_OF_VALUE(x) #x
 
 const morph_compare_entry morph_compare_entries[MORPH_COMPARE_METHODS] = {
-    [MORPH_COMPARE_BLANKET] = {"blanket", "pure blanket, at its end", "", run_blanket},
-    [MORPH_COMPARE_SEEDS] = {"seeds", "blanket with seed centres only", "", run_seeds},
-    [MORPH_COMPARE_NLOPT] = {"nlopt", "blanket under the centres that NLopt placed", "", run_nlopt},
-    [MORPH_COMPARE_GUIDED] = {"guided", "blanket under the centres that Ipopt placed", "", run_guided},
-    [MORPH_COMPARE_PLAN] = {"plan", "full plan, at its end", "\"method\": \"ipopt\"", run_plan},
+    [MORPH_COMPARE_BLANKET] = {"blanket", "pure blanket, at its end", "", run_blanket, false},
+    [MORPH_COMPARE_SEEDS] = {"seeds", "blanket with seed centres only", "", run_seeds, true},
+    [MORPH_COMPARE_NLOPT] = {"nlopt", "blanket under the centres that NLopt placed", "", run_nlopt, true},
+    [MORPH_COMPARE_GUIDED] = {"guided", "blanket under the centres that Ipopt placed", "", run_guided, true},
+    [MORPH_COMPARE_PLAN] = {"plan", "full plan, at its end", "\"method\": \"ipopt\"", run_plan, false},
     [MORPH_COMPARE_REFERENCE] = {"reference", "no limits of length and angle: local, not a proven bound",
                                  "\"length\": [" TEXT_OF(MORPH_REFERENCE_SHORTEST) ", " TEXT_OF(
                                      MORPH_REFERENCE_LONGEST) "], \"angle\": " TEXT_OF(MORPH_REFERENCE_ANGLE),
-                                 run_reference}};
+                                 run_reference, false}};
 
 const char *morph_compare_name(morph_compare_method method) {
     return morph_compare_entries[method].name;

@@ -27,6 +27,7 @@ typedef struct morph_compare_entry {
      * other than MORPH_OK is the caller's to put into words; row->reason goes before them if it is set. NULL:
      * there is no such method yet. */
     morph_status (*run)(morph_compare_shared *shared, morph_compare_row *row);
+    bool places; /* centres of its own: not run where the scene wants none */
 } morph_compare_entry;
 
 extern const morph_compare_entry morph_compare_entries[MORPH_COMPARE_METHODS];
