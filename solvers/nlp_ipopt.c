@@ -229,7 +229,8 @@ static bool set_options(IpoptProblem p, const morph_nlp_options *o) {
               set_text(p, "mu_strategy", o->adaptive_mu ? "adaptive" : "monotone");
     if (o->mu_init > 0) ok = ok && set_number(p, "mu_init", o->mu_init);
     /* The damping of one-sided bounds would leave kappa_d mu_target (1e-5) in the gradient. */
-    if (o->mu_target > 0) ok = ok && set_number(p, "mu_target", o->mu_target) && set_number(p, "kappa_d", 0.0);
+    if (o->mu_target > 0)
+        ok = ok && set_number(p, "mu_target", o->mu_target) && set_number(p, "kappa_d", 0.0);
     if (!o->warm) return ok;
     /* Without the five pushes Ipopt moves a converged point 1e-3 inwards and loses most of its worth. */
     static const char *const push[] = {"warm_start_bound_push", "warm_start_bound_frac",
