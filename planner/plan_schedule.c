@@ -34,27 +34,60 @@ static morph_status cut_tangle(morph_planner *p) {
     return status;
 }
 
-morph_status morph_stage_refine(morph_planner *p) {
-    if (p->options->method != MORPH_METHOD_IPOPT || p->stopped) return MORPH_OK;
-    const double since = morph_seconds();
+/* Refines p->end into *report. */
+static morph_status refine(morph_planner *p, morph_refine_report *report) {
     morph_refine_options o = morph_refine_defaults();
     o.control = morph_planner_control(p);
     o.goal = p->scene->goal;
-    morph_status status = p->guided ? MORPH_OK : cut_tangle(p);
-    if (status == MORPH_OK) status = morph_refine(&p->work.world, &o, p->end, &p->refined);
-    const morph_refine_report r = p->refined;
+    morph_status status = morph_refine(&p->work.world, &o, p->end, report);
     if (status == MORPH_ERR_STOPPED) {
         p->stopped = true;
         status = MORPH_OK;
     }
     morph_summary *s = &p->plan->summary;
-    s->iterations_refine = r.effort.iterations;
-    s->unknowns_refine = r.effort.unknowns;
-    s->rows_refine_used = r.effort.rows;
-    s->rows_refine_possible = r.rows_possible;
-    s->linear_seconds += r.effort.linear_seconds;
-    s->callback_seconds += r.effort.callback_seconds;
-    p->optimal = r.last == MORPH_OPTIMAL;
+    s->iterations_refine += report->effort.iterations;
+    s->linear_seconds += report->effort.linear_seconds;
+    s->callback_seconds += report->effort.callback_seconds;
+    return status;
+}
+
+/* A goal that was missed from where attraction led may be in reach from where the pure blanket lay: the shape
+ * that misses it by less is kept. */
+static morph_status refine_nominal(morph_planner *p) {
+    const size_t width = 3 * (size_t)p->work.structure->joints;
+    double *end = morph_alloc(width, sizeof *end);
+    if (!end) return MORPH_ERR_NOMEM;
+    memcpy(end, p->end, width * sizeof *end);
+    memcpy(p->end, &p->nominal.x[(size_t)(p->nominal.frames - 1) * width], width * sizeof *p->end);
+    morph_log(morph_planner_control(p),
+              "refine: the goal is missed from the guided blanket's end: from the pure one's");
+    morph_refine_report other = {0};
+    morph_status status = cut_tangle(p);
+    if (status == MORPH_OK) status = refine(p, &other);
+    if (status == MORPH_OK && other.feasible && other.miss < p->refined.miss) {
+        const morph_refine_report worse = p->refined;
+        p->refined = other;
+        other = worse;
+        p->way = &p->nominal;
+    } else {
+        memcpy(p->end, end, width * sizeof *end);
+    }
+    morph_refine_report_free(&other);
+    free(end);
+    return status;
+}
+
+morph_status morph_stage_refine(morph_planner *p) {
+    if (p->options->method != MORPH_METHOD_IPOPT || p->stopped) return MORPH_OK;
+    const double since = morph_seconds();
+    morph_status status = p->guided ? MORPH_OK : cut_tangle(p);
+    if (status == MORPH_OK) status = refine(p, &p->refined);
+    if (status == MORPH_OK && p->guided && p->refined.miss > 0.0 && !p->stopped) status = refine_nominal(p);
+    morph_summary *s = &p->plan->summary;
+    s->unknowns_refine = p->refined.effort.unknowns;
+    s->rows_refine_used = p->refined.effort.rows;
+    s->rows_refine_possible = p->refined.rows_possible;
+    p->optimal = p->refined.last == MORPH_OPTIMAL;
     morph_planner_time(p, MORPH_STAGE_REFINE, since);
     return status;
 }
@@ -74,7 +107,7 @@ static morph_status try_path(morph_planner *p, bool unfold, bool stations, int i
     morph_curve *curve = NULL;
     morph_path_report r;
     const morph_status status =
-        morph_path_plan(&p->work.world, &p->nominal, p->work.start, p->end, &o, &curve, &r);
+        morph_path_plan(&p->work.world, p->way, p->work.start, p->end, &o, &curve, &r);
     morph_summary *s = &p->plan->summary;
     s->iterations_path += r.effort.iterations;
     s->linear_seconds += r.effort.linear_seconds;
