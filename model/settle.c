@@ -2,6 +2,8 @@
 #include "model/settle_internal.h"
 
 #include <string.h>
+#include <stdio.h> /*DBG*/
+#include <stdlib.h> /*DBG*/
 
 /* Drag of the first step in loads per spacing: free fall then moves a quarter of a spacing. */
 #define FIRST_DRAG 4.0
@@ -17,12 +19,16 @@ enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 
 #define HELD 1e-7
 /* Depth of a whole element that counts as clear, in spacings: far below the smooth distance's own error,
  * which is some 1e-3 and more at edges; a new place for less would only stir the contacts up again. */
-#define CLEAR 1e-5
+#define CLEAR 1e-4
+/* Least part of the indefinite Hessian that is tried. */
+#define LEAST_SHARE 0.25
 /* Penalties grow where an update leaves more than a quarter of a violation, to at most this. */
-#define MOST_PENALTY 1e5
+#define MOST_PENALTY (getenv("MP")?atof(getenv("MP")):4e3)
 /* Forces that grow by less than this in a step do not keep the next step from growing: a part that falls
  * freely, or swings down, has the same force left over all the way, give or take a little. */
 #define STEADY 1.02
+#define CLOSE (getenv("CL")?atof(getenv("CL")):1e-3)
+#define LAST_PENALTY (getenv("LP")?atof(getenv("LP")):1e6)
 /* Kick that leaves a balanced but unstable shape, in spacings. */
 #define KICK 2e-3
 
@@ -40,25 +46,28 @@ static double largest_move(const morph_settle *s, const double *to) {
     return most;
 }
 
-/* Factors the Hessian at x: the exact one where it is positive definite, else its safe part (which drag makes
- * so). A failed try costs a factorisation, so the next ones come later. */
+/* Factors SAFE + share (EXACT - SAFE) at x with the first share of 1, 1/2, 1/4, 0 at which it is positive
+ * definite (drag sees to it at 0), beginning one above that of the last time: failed tries cost as much as
+ * good ones. */
 static morph_status factor(morph_settle *s, double *energy) {
-    int column = 0;
-    const bool exact = s->exact_after <= 0;
-    *energy = morph_settle_evaluate(s, s->x, exact ? MORPH_SETTLE_EXACT : MORPH_SETTLE_SAFE);
+    const size_t nonzeros = (size_t)s->start[3 * s->joints];
+    *energy = morph_settle_evaluate(s, s->x, MORPH_SETTLE_SAFE);
     if (!isfinite(*energy)) return MORPH_ERR_NONFINITE;
-    s->exact_after--;
-    double since = morph_seconds();
-    morph_status status = morph_sparse_factor(s->sparse, s->value, &column);
-    s->linear_seconds += morph_seconds() - since;
-    if (status != MORPH_OK || column < 0 || !exact)
-        return status == MORPH_OK && column >= 0 ? MORPH_ERR_NONFINITE : status;
-    s->exact_after = 5;
-    morph_settle_evaluate(s, s->x, MORPH_SETTLE_SAFE);
-    since = morph_seconds();
-    status = morph_sparse_factor(s->sparse, s->value, &column);
-    s->linear_seconds += morph_seconds() - since;
-    return status == MORPH_OK && column >= 0 ? MORPH_ERR_NONFINITE : status;
+    memcpy(s->spare, s->value, nonzeros * sizeof *s->spare);
+    morph_settle_evaluate(s, s->x, MORPH_SETTLE_EXACT);
+    double share = 1.0, next = fmin(1.0, s->share > 0.0 ? 2.0 * s->share : LEAST_SHARE);
+    for (int column = 0;; next = next > LEAST_SHARE ? 0.5 * next : 0.0) {
+        for (size_t k = 0; k < nonzeros && next < share; k++)
+            s->value[k] = s->spare[k] + next / share * (s->value[k] - s->spare[k]);
+        share = next;
+        const double since = morph_seconds();
+        const morph_status status = morph_sparse_factor(s->sparse, s->value, &column);
+        s->linear_seconds += morph_seconds() - since;
+        if (status != MORPH_OK) return status;
+        s->share = share;
+        if (column < 0) return MORPH_OK;
+        if (share == 0.0) return MORPH_ERR_NONFINITE;
+    }
 }
 
 /* Armijo's rule by halving; energies closer than rounding count as equal. */
@@ -113,7 +122,6 @@ static double residual(morph_settle *s) {
 }
 
 static void penalties(morph_settle *s, double factor) {
-    if (s->stiff >= MOST_PENALTY) return;
     s->stiff *= factor;
     s->stiff_length *= factor;
     s->stiff_angle *= factor;
@@ -134,7 +142,7 @@ static void kick(morph_settle *s, int saddle) {
  * on the step's own motion (a contact made in this step holds from its second round on). Returns in *worst
  * the violation left. */
 static morph_status step(morph_settle *s, double residual, double *worst, bool *good) {
-    const double target = fmax(FORCING * residual, 0.3 * s->tolerance);
+    const double target = fmax(FORCING * residual, 0.1 * s->tolerance);
     for (int round = 0; round < MOST_ROUNDS; round++) {
         const morph_status status = newton(s, target, good);
         if (status != MORPH_OK) return status;
@@ -143,7 +151,8 @@ static morph_status step(morph_settle *s, double residual, double *worst, bool *
         if (!*good) break;
         morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
         if (largest_force(s) <= 3.0 * target) break;
-        if (round > 0 && *worst > 0.25 * last && *worst > HELD) penalties(s, 4.0);
+        if (round > 0 && *worst > 0.25 * last && *worst > HELD && s->stiff < MOST_PENALTY)
+            penalties(s, 4.0);
     }
     morph_settle_slide(s, s->x);
     return MORPH_OK;
@@ -164,7 +173,7 @@ static morph_status run(morph_settle *s, const morph_control *control, morph_set
     double worst = INFINITY, move = INFINITY, last = INFINITY;
     bool good = true;
     s->drag = FIRST_DRAG;
-    s->exact_after = 0;
+    s->share = 1.0;
     for (r->steps = 0; r->steps < s->most_steps; r->steps++) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
         const double deep = morph_settle_seek(s, s->x, fmax(0.5 * CLEAR, fmin(1e-3, 0.1 * move)));
@@ -178,14 +187,20 @@ static morph_status run(morph_settle *s, const morph_control *control, morph_set
             kick(s, r->saddles++);
             r->converged = false;
         }
-        if (r->steps > 0)
+        if (r->steps > 0) {
             next_drag(s, good, move, r->residual, last);
+            if (good && move < CLOSE && r->residual > 0.5 * last && s->stiff < LAST_PENALTY)
+                penalties(s, 4.0);
+            else if (move > 10.0 * CLOSE && s->stiff > MOST_PENALTY)
+                penalties(s, MOST_PENALTY / s->stiff);
+        }
         else /* a start close to rest, as a warm one, need not creep there */
             s->drag = fmin(FIRST_DRAG, fmax(LEAST_DRAG, FIRST_DRAG * r->residual));
         last = r->residual;
         const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
         if (status != MORPH_OK) return status;
         move = largest_move(s, s->x);
+        if (getenv("DBG")) { int st=0,sl=0,nc=0,sk=0; for(int n=0;n<s->places;n++){morph_settle_place*p=&s->place[n]; if(p->push>1e-9){nc++; sk+=p->seeks; double u=s->grip*morph_norm(p->slip); if(u>=0.899*p->cone) sl++; else st++;}} fprintf(stderr,"%3d it %4d res %.2e drag %.2e worst %.1e deep %.1e move %.2e good %d contacts %d seek %d stick %d slide %d stiff %.0f ex %d E %.6f\n", r->steps, s->iterations, r->residual, s->drag, worst, deep, move, good, nc, sk, st, sl, s->stiff, (int)(100*s->share), 0.0);} /*DBG*/
     }
     return MORPH_OK;
 }

@@ -90,7 +90,7 @@ struct morph_settle {
     morph_sparse *sparse;
     bool factored; /* sparse holds the factor of the resting shape, spare its Hessian without penalties */
 
-    int exact_after; /* iterations for which the exact Hessian is not tried again */
+    double share; /* of the Hessian's indefinite part in the last factor */
     int iterations;
     double linear_seconds;
 };
