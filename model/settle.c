@@ -169,6 +169,17 @@ static void next_drag(morph_settle *s, bool good, double move, double residual, 
         s->drag = fmax(LEAST_DRAG, s->drag / 2.0);
 }
 
+/* Near rest, where multipliers converge too slowly, penalties grow; they fall again where the shape still has
+ * to move along its curved limits, which stiff ones forbid to Newton, and limits are held well. */
+static void next_penalty(morph_settle *s, bool good, double move, double residual, double last,
+                         double worst) {
+    const double force = s->stiff * worst;
+    if (good && move < CLOSE && residual > 0.5 * last && force > 0.3 * residual && s->drag * move < 0.3 * residual && s->stiff < LAST_PENALTY)
+        penalties(s, 4.0);
+    else if (s->stiff > MOST_PENALTY && (move > 10.0 * CLOSE || s->drag * move > 0.3 * residual))
+        penalties(s, fmax(0.25, MOST_PENALTY / s->stiff));
+}
+
 static morph_status run(morph_settle *s, const morph_control *control, morph_settle_report *r) {
     double worst = INFINITY, move = INFINITY, last = INFINITY;
     bool good = true;
@@ -188,11 +199,8 @@ static morph_status run(morph_settle *s, const morph_control *control, morph_set
             r->converged = false;
         }
         if (r->steps > 0) {
+            next_penalty(s, good, move, r->residual, last, worst);
             next_drag(s, good, move, r->residual, last);
-            if (good && move < CLOSE && r->residual > 0.5 * last && s->stiff < LAST_PENALTY)
-                penalties(s, 4.0);
-            else if (move > 10.0 * CLOSE && s->stiff > MOST_PENALTY)
-                penalties(s, MOST_PENALTY / s->stiff);
         }
         else /* a start close to rest, as a warm one, need not creep there */
             s->drag = fmin(FIRST_DRAG, fmax(LEAST_DRAG, FIRST_DRAG * r->residual));
