@@ -125,7 +125,18 @@ static double distance(const morph_settle *s, const double q[3], double *g, doub
     return phi;
 }
 
+static double exact_distance(const morph_settle *s, const double q[3], double *g) {
+    double p[3];
+    morph_closest at;
+    for (int k = 0; k < 3; k++)
+        p[k] = q[k] * s->length_unit;
+    morph_distance_point(s->exact, p, &at);
+    if (g) memcpy(g, at.normal, sizeof at.normal);
+    return at.distance / s->length_unit;
+}
+
 static double true_gap(const morph_settle *s, const morph_settle_place *p, const double q[3], double *g) {
+    if (p->seeks && s->exact) return exact_distance(s, q, g) - p->radius;
     if (!p->plane) return distance(s, q, g, NULL) - p->radius;
     if (g) g[0] = g[1] = 0.0, g[2] = 1.0;
     return q[2] - s->base - p->radius;
@@ -382,6 +393,20 @@ static double deepest(const morph_settle *s, const morph_settle_element *e, cons
     return least;
 }
 
+static double deepest_exact(const morph_settle *s, const morph_settle_element *e, const double *x,
+                            double weight[3]) {
+    double v[3][3];
+    morph_closest at;
+    for (int j = 0; j < e->corners; j++) {
+        weight[j] = 1.0 / e->corners;
+        for (int k = 0; k < 3; k++)
+            v[j][k] = x[3 * e->joint[j] + k] * s->length_unit;
+    }
+    morph_distance_element(s->exact, (const double(*)[3])v, e->corners, e->radius * s->length_unit, weight,
+                           &at);
+    return at.distance / s->length_unit;
+}
+
 /* The seeker to put at `weight`: one close by, else a free one, else the one that carries least. */
 static morph_settle_place *seeker_for(morph_settle *s, const morph_settle_element *e,
                                       const double weight[3]) {
@@ -413,7 +438,8 @@ double morph_settle_seek(morph_settle *s, const double *x, double tolerance) {
             morph_settle_place *p = &s->place[e->first + k];
             if (p->push == 0.0 && p->gap > FORGET) p->used = false;
         }
-        const double depth = e->radius - deepest(s, e, x, weight);
+        const double depth =
+            e->radius - (s->exact ? deepest_exact(s, e, x, weight) : deepest(s, e, x, weight));
         worst = fmax(worst, depth);
         if (!(depth > tolerance)) continue;
         morph_settle_place *p = seeker_for(s, e, weight);
