@@ -1,4 +1,5 @@
-/* Settle with friction on grids of 16 x 16. */
+/* Settle with friction on a grid of 16 x 16 over a sphere; with an argument over a box or a saddle instead
+ * (each takes some ten seconds): test_settle_large [box|saddle]. */
 #include "settle_check.h"
 
 static void sphere(void **state) {
@@ -16,8 +17,11 @@ static void saddle(void **state) {
     rest(16, SADDLE, 0.4, NULL, 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(sphere), cmocka_unit_test(box),
-                                       cmocka_unit_test(saddle)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+int main(int argc, char **argv) {
+    const char *name = argc > 1 ? argv[1] : "sphere";
+    const struct CMUnitTest over_sphere[] = {cmocka_unit_test(sphere)}, over_box[] = {cmocka_unit_test(box)},
+                            over_saddle[] = {cmocka_unit_test(saddle)};
+    if (strcmp(name, "box") == 0) return cmocka_run_group_tests(over_box, NULL, NULL);
+    if (strcmp(name, "saddle") == 0) return cmocka_run_group_tests(over_saddle, NULL, NULL);
+    return cmocka_run_group_tests(over_sphere, NULL, NULL);
 }
