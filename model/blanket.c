@@ -360,6 +360,9 @@ morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf
     else
         status = trajectory_create(out, (int)frames, structure->joints);
     if (status == MORPH_OK) status = run(b, (int)frames, control, out, &local);
+    local.came_through = b->guard.through > 0;
+    local.through_element = b->guard.through - 1;
+    local.through_time = b->time;
     morph_blanket_state_destroy(b);
     if (status != MORPH_OK && status != MORPH_ERR_STOPPED) morph_trajectory_free(out);
     local.seconds = morph_seconds() - begin;

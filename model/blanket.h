@@ -79,6 +79,11 @@ typedef struct morph_blanket_report {
     int steps, step_halvings;
     int guarded, crossings; /* steps that the swept guard looked at; those that it refused */
     double step;            /* s */
+    /* The run was refused: at this time this element, a link or (from `links` on) skin triangle, would have
+     * come through the target, however short the steps. */
+    bool came_through;
+    int through_element;
+    double through_time;
     bool at_rest;
     double rest_speed; /* m/s, fastest joint at the end */
     /* Worst violation over the recorded frames (m, relative, sine, m); 0 if none. */
@@ -96,9 +101,10 @@ typedef struct morph_blanket_report {
  * target). `exact` may be NULL or is used to polish recorded frames, to measure worst_clearance, and to tell
  * the motion where between its places parts of the target come through. report may be NULL. On
  * MORPH_ERR_STOPPED the frames so far are in *out; on any other failure *out is empty. MORPH_ERR_NONFINITE if
- * x0 is not finite or the motion cannot be kept from growing without cause; MORPH_ERR_INPUT for a negative or
- * non-finite def, a joint that does not exist, or more than 1e6 frames or steps a frame (of the blanket or of
- * the body), a body beside a rigid target. */
+ * x0 is not finite, the motion cannot be kept from growing without cause, or cannot be kept from coming
+ * through the target (report->came_through); MORPH_ERR_INPUT for a negative or non-finite def, a joint that
+ * does not exist, or more than 1e6 frames or steps a frame (of the blanket or of the body), a body beside a
+ * rigid target. */
 morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf *sdf,
                                const morph_distance *exact, const morph_blanket_def *def, const double *x0,
                                const morph_control *control, morph_trajectory *out,

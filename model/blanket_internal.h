@@ -98,6 +98,7 @@ enum { MORPH_BLANKET_WATCHED = 64 };
 typedef struct morph_guard {
     int steps, crossings;             /* looked at; refused, in all */
     int refused;                      /* in this frame */
+    int through;                      /* 1 + the element that no step keeps outside; 0: none */
     int watch[MORPH_BLANKET_WATCHED]; /* elements that were crossed: links, then skin triangles */
     int watched;
     int usual;         /* steps of a frame before it refused some; 0: none kept */

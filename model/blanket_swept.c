@@ -15,9 +15,10 @@
 
 #include <string.h>
 
-/* Times that the steps of one frame are refused. What is crossed even so, others must settle: the polishing
- * of the frame by exact distances. */
-#define MOST_REFUSED 4
+/* Times that the steps of one frame are refused, each time halved. What is crossed even so ends the run:
+ * where the motion cannot be resolved, no one can say on which side of the target the sheet would come out.
+ */
+#define MOST_REFUSED 6
 /* Triangles near one element, at most; meshes so fine have their places closer together than that. */
 enum { MOST_NEAR = 256 };
 /* Part of the least radius that a step may move where contact cannot be relied on: the field does not feel
@@ -288,19 +289,23 @@ static bool crosses_soft(const morph_blanket_state *b, const element *e) {
 }
 
 bool morph_blanket_guard(morph_blanket_state *b) {
-    if (b->def.unguarded || b->guard.refused >= MOST_REFUSED || !isfinite(b->most_move)) return true;
+    if (b->def.unguarded) return true;
     if (!b->soft && (!b->sdf || !b->exact)) return true;
     if (!far_enough(b)) return true;
     const morph_structure *s = b->structure;
-    bool crossed = false;
+    int crossed = 0;
     b->guard.steps++;
     /* All of them: each is watched from now on. */
     for (int n = 0; n < s->links + s->skin_triangles; n++) {
         element e;
         if (!set_element(b, n, &e)) continue;
-        if (b->soft ? crosses_soft(b, &e) : crosses_rigid(b, &e)) crossed = true;
+        if (b->soft ? crosses_soft(b, &e) : crosses_rigid(b, &e)) crossed = n + 1;
     }
-    b->guard.refused += crossed;
-    b->guard.crossings += crossed;
-    return !crossed;
+    if (crossed == 0) return true;
+    b->guard.crossings++;
+    if (++b->guard.refused > MOST_REFUSED || !isfinite(b->most_move)) {
+        b->guard.through = crossed;
+        b->status = MORPH_ERR_NONFINITE;
+    }
+    return false;
 }

@@ -6,25 +6,44 @@
 /* Drag of the first step in loads per spacing: free fall then moves a quarter of a spacing. */
 #define FIRST_DRAG 4.0
 #define LEAST_DRAG 1e-3
+/* The least drag itself is raised to at most this, where shorter steps are wanted near rest. */
+#define MOST_LEAST_DRAG 1.0
 /* A joint moves this far in a Newton step and in an implicit step, at most (spacings): contacts within twice
  * the second are listed. */
 #define MOST_NEWTON 0.2
 #define MOST_MOVE 0.4
 /* Newton stops once the gradient is this part of the step's first: the multipliers are renewed after it. */
 #define FORCING 0.1
-enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4 };
-/* Violation of limits that counts as held: a tenth of what lengths are checked to elsewhere, in spacings. */
-#define HELD 1e-7
-/* Depth of a whole element that counts as clear, in spacings: far below the smooth distance's own error,
- * which is some 1e-3 and more at edges; a new place for less would only stir the contacts up again. */
-#define CLEAR 1e-5
-/* Penalties grow where an update leaves more than a quarter of a violation, to at most this. */
-#define MOST_PENALTY 1e5
+enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4, PATIENCE = 8, FALLING = 40 };
+/* Violation of limits that counts as held, in spacings: what lengths are checked to elsewhere. */
+#define HELD 1e-9
+/* Forces of the load balance to about this. */
+#define ROUNDING 1e-10
+/* Depth of a whole element that counts as clear, in spacings: a tenth of what is allowed elsewhere. The
+ * smooth distance's own error is some 1e-3 and more at edges; a new place for less would only stir the
+ * contacts up again (at 1e-5 the forces left over went on jumping by 1e-2 of a weight). */
+#define CLEAR 1e-4
+/* Least part of the Hessian's indefinite part that is tried. */
+#define LEAST_SHARE 0.25
+/* Penalties grow where an update leaves more than a quarter of a violation, to at most the first; near rest,
+ * in steps shorter than CLOSE (spacings), to at most the second. */
+#define MOST_PENALTY 4e3
+#define LAST_PENALTY 1e6
+#define CLOSE 1e-3
 /* Forces that grow by less than this in a step do not keep the next step from growing: a part that falls
  * freely, or swings down, has the same force left over all the way, give or take a little. */
 #define STEADY 1.02
 /* Kick that leaves a balanced but unstable shape, in spacings. */
 #define KICK 2e-3
+
+const char *morph_settle_outcome_text(morph_settle_outcome outcome) {
+    static const char *const text[] = {"at rest",
+                                       "no rest: it has left the target and falls, nothing is beneath it",
+                                       "not at rest: it still slides or falls after the most steps allowed",
+                                       "not at rest: contacts or limits change to and fro, forces are left "
+                                       "over after the most steps allowed"};
+    return outcome >= MORPH_SETTLE_RESTS && outcome <= MORPH_SETTLE_STALLS ? text[outcome] : "unknown";
+}
 
 static double largest_force(const morph_settle *s) {
     double most = 0.0;
@@ -40,25 +59,28 @@ static double largest_move(const morph_settle *s, const double *to) {
     return most;
 }
 
-/* Factors the Hessian at x: the exact one where it is positive definite, else its safe part (which drag makes
- * so). A failed try costs a factorisation, so the next ones come later. */
+/* Factors SAFE + share (EXACT - SAFE) at x with the first share of 1, 1/2, 1/4, 0 at which it is positive
+ * definite (drag sees to it at 0), beginning one above that of the last time: failed tries cost as much as
+ * good ones. */
 static morph_status factor(morph_settle *s, double *energy) {
-    int column = 0;
-    const bool exact = s->exact_after <= 0;
-    *energy = morph_settle_evaluate(s, s->x, exact ? MORPH_SETTLE_EXACT : MORPH_SETTLE_SAFE);
+    const size_t nonzeros = (size_t)s->start[3 * s->joints];
+    *energy = morph_settle_evaluate(s, s->x, MORPH_SETTLE_SAFE);
     if (!isfinite(*energy)) return MORPH_ERR_NONFINITE;
-    s->exact_after--;
-    double since = morph_seconds();
-    morph_status status = morph_sparse_factor(s->sparse, s->value, &column);
-    s->linear_seconds += morph_seconds() - since;
-    if (status != MORPH_OK || column < 0 || !exact)
-        return status == MORPH_OK && column >= 0 ? MORPH_ERR_NONFINITE : status;
-    s->exact_after = 5;
-    morph_settle_evaluate(s, s->x, MORPH_SETTLE_SAFE);
-    since = morph_seconds();
-    status = morph_sparse_factor(s->sparse, s->value, &column);
-    s->linear_seconds += morph_seconds() - since;
-    return status == MORPH_OK && column >= 0 ? MORPH_ERR_NONFINITE : status;
+    memcpy(s->spare, s->value, nonzeros * sizeof *s->spare);
+    morph_settle_evaluate(s, s->x, MORPH_SETTLE_EXACT);
+    double share = 1.0, next = fmin(1.0, s->share > 0.0 ? 2.0 * s->share : LEAST_SHARE);
+    for (int column = 0;; next = next > LEAST_SHARE ? 0.5 * next : 0.0) {
+        for (size_t k = 0; k < nonzeros && next < share; k++)
+            s->value[k] = s->spare[k] + next / share * (s->value[k] - s->spare[k]);
+        share = next;
+        const double since = morph_seconds();
+        const morph_status status = morph_sparse_factor(s->sparse, s->value, &column);
+        s->linear_seconds += morph_seconds() - since;
+        if (status != MORPH_OK) return status;
+        s->share = share;
+        if (column < 0) return MORPH_OK;
+        if (share == 0.0) return MORPH_ERR_NONFINITE;
+    }
 }
 
 /* Armijo's rule by halving; energies closer than rounding count as equal. */
@@ -112,8 +134,13 @@ static double residual(morph_settle *s) {
     return largest_force(s);
 }
 
+/* In weights where there is weight, as far as rounding beside the centres' pull lets forces balance. */
+static double enough(const morph_settle *s) {
+    const double part = s->weight > 0.0 ? fmin(1.0, fmax(s->weight, 1e-3)) : 1.0;
+    return fmax(s->tolerance * part, fmin(s->tolerance, ROUNDING));
+}
+
 static void penalties(morph_settle *s, double factor) {
-    if (s->stiff >= MOST_PENALTY) return;
     s->stiff *= factor;
     s->stiff_length *= factor;
     s->stiff_angle *= factor;
@@ -134,7 +161,7 @@ static void kick(morph_settle *s, int saddle) {
  * on the step's own motion (a contact made in this step holds from its second round on). Returns in *worst
  * the violation left. */
 static morph_status step(morph_settle *s, double residual, double *worst, bool *good) {
-    const double target = fmax(FORCING * residual, 0.3 * s->tolerance);
+    const double target = fmax(FORCING * residual, 0.1 * enough(s));
     for (int round = 0; round < MOST_ROUNDS; round++) {
         const morph_status status = newton(s, target, good);
         if (status != MORPH_OK) return status;
@@ -143,7 +170,7 @@ static morph_status step(morph_settle *s, double residual, double *worst, bool *
         if (!*good) break;
         morph_settle_evaluate(s, s->x, MORPH_SETTLE_GRADIENT);
         if (largest_force(s) <= 3.0 * target) break;
-        if (round > 0 && *worst > 0.25 * last && *worst > HELD) penalties(s, 4.0);
+        if (round > 0 && *worst > 0.25 * last && *worst > HELD && s->stiff < MOST_PENALTY) penalties(s, 4.0);
     }
     morph_settle_slide(s, s->x);
     return MORPH_OK;
@@ -154,33 +181,95 @@ static void next_drag(morph_settle *s, bool good, double move, double residual, 
     if (!good || move > 0.75 * MOST_MOVE || residual > 4.0 * last)
         s->drag *= 2.0;
     else if (residual < 0.5 * last && move < 0.25 * MOST_MOVE)
-        s->drag = fmax(LEAST_DRAG, s->drag / 8.0);
+        s->drag = fmax(s->least_drag, s->drag / 8.0);
     else if ((residual <= last && move < 0.5 * MOST_MOVE) ||
              (residual <= STEADY * last && move < 0.25 * MOST_MOVE))
-        s->drag = fmax(LEAST_DRAG, s->drag / 2.0);
+        s->drag = fmax(s->least_drag, s->drag / 2.0);
+}
+
+/* Near rest, where multipliers converge too slowly, penalties grow; they fall again where the shape still has
+ * to move along its curved limits, which stiff ones forbid to Newton, and limits are held well. */
+static void next_penalty(morph_settle *s, bool good, double move, double residual, double last,
+                         double worst) {
+    const double force = s->stiff * worst;
+    if (good && move < CLOSE && residual > 0.5 * last && force > 0.3 * residual &&
+        s->drag * move < 0.3 * residual && s->stiff < LAST_PENALTY)
+        penalties(s, 4.0);
+    else if (s->stiff > MOST_PENALTY && (move > 10.0 * CLOSE || s->drag * move > 0.3 * residual))
+        penalties(s, fmax(0.25, MOST_PENALTY / s->stiff));
+}
+
+/* Where the forces left over find no new low for PATIENCE steps, the steps are too long for the contacts,
+ * which are planes within one: the least drag goes up until they do. */
+static void watch_progress(morph_settle *s, double residual) {
+    if (residual < 0.8 * s->best) {
+        s->best = residual;
+        s->best_age = 0;
+        s->least_drag = fmax(LEAST_DRAG, s->least_drag / 4.0);
+    } else if (++s->best_age >= PATIENCE) {
+        s->best = residual;
+        s->best_age = 0;
+        s->least_drag = fmin(MOST_LEAST_DRAG, 4.0 * s->least_drag);
+        s->drag = fmax(s->drag, s->least_drag);
+    }
+}
+
+/* Nothing that could end a fall: no centre, no held joint, no plane, no contact, and, for as many steps as
+ * count, the target further away after each (a free step goes a quarter of a spacing down). */
+static bool falls(morph_settle *s) {
+    double near = INFINITY;
+    if (s->attractors > 0 || !isnan(s->base) || !(s->weight > 0.0)) return false;
+    for (int j = 0; j < s->joints; j++)
+        if (s->fixed[j]) return false;
+    bool held = false;
+    for (int n = 0; n < s->places; n++)
+        held = held || s->place[n].push > 0.0;
+    for (int j = 0; j < s->joints && s->sdf; j++) {
+        double p[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = s->x[3 * j + k] * s->length_unit;
+        near = fmin(near, morph_sdf_eval(s->sdf, p, NULL, NULL));
+    }
+    s->falling = !held && !(near < s->nearest) ? s->falling + 1 : 0;
+    s->nearest = near;
+    return s->falling >= (s->sdf ? FALLING : 1);
+}
+
+static void start_run(morph_settle *s) {
+    s->drag = FIRST_DRAG;
+    s->share = 1.0;
+    s->least_drag = LEAST_DRAG;
+    s->best = INFINITY;
+    s->best_age = 0;
+    s->falling = 0;
+    s->nearest = INFINITY;
 }
 
 static morph_status run(morph_settle *s, const morph_control *control, morph_settle_report *r) {
     double worst = INFINITY, move = INFINITY, last = INFINITY;
     bool good = true;
-    s->drag = FIRST_DRAG;
-    s->exact_after = 0;
+    start_run(s);
     for (r->steps = 0; r->steps < s->most_steps; r->steps++) {
         if (morph_stopped(control)) return MORPH_ERR_STOPPED;
         const double deep = morph_settle_seek(s, s->x, fmax(0.5 * CLEAR, fmin(1e-3, 0.1 * move)));
         morph_settle_begin(s, s->x);
         memcpy(s->before, s->x, 3 * (size_t)s->joints * sizeof(double));
         r->residual = residual(s);
-        if (r->residual <= s->tolerance && worst <= HELD && deep <= CLEAR) {
-            r->converged = true;
+        if (r->residual <= enough(s) && worst <= HELD && deep <= CLEAR) {
+            r->outcome = MORPH_SETTLE_RESTS;
             const morph_status status = morph_settle_examine(s, &r->stable);
             if (status != MORPH_OK || r->stable || r->saddles == MOST_SADDLES) return status;
             kick(s, r->saddles++);
-            r->converged = false;
         }
-        if (r->steps > 0)
+        r->outcome = falls(s)                             ? MORPH_SETTLE_FALLS
+                     : s->drag * move > 0.3 * r->residual ? MORPH_SETTLE_MOVES
+                                                          : MORPH_SETTLE_STALLS;
+        if (r->outcome == MORPH_SETTLE_FALLS) return MORPH_OK;
+        if (r->steps > 0) {
+            next_penalty(s, good, move, r->residual, last, worst);
             next_drag(s, good, move, r->residual, last);
-        else /* a start close to rest, as a warm one, need not creep there */
+            watch_progress(s, r->residual);
+        } else /* a start close to rest, as a warm one, need not creep there */
             s->drag = fmin(FIRST_DRAG, fmax(LEAST_DRAG, FIRST_DRAG * r->residual));
         last = r->residual;
         const morph_status status = step(s, fmax(last, worst < 1.0 ? worst : 0.0), &worst, &good);
@@ -235,12 +324,13 @@ static void measure(morph_settle *s, const double *x, morph_settle_report *r) {
     r->energy = morph_settle_energy(s, x);
     r->load = s->load;
     if (s->weight > 0.0) r->residual /= s->weight;
+    r->converged = r->outcome == MORPH_SETTLE_RESTS;
 }
 
 morph_status morph_settle_run(morph_settle *s, double *x, bool warm, const morph_control *control,
                               morph_settle_report *report) {
     const double since = morph_seconds();
-    morph_settle_report r = {0};
+    morph_settle_report r = {.outcome = MORPH_SETTLE_STALLS};
     for (int k = 0; k < 3 * s->joints; k++)
         if (!isfinite(x[k])) return MORPH_ERR_NONFINITE;
     for (int k = 0; k < 3 * s->joints; k++)

@@ -7,9 +7,12 @@
  *
  * in implicit steps of a motion without mass (each joint resists being moved by an equal viscous force), the
  * step growing without bound as the shape comes to rest: the sheet falls, touches and drapes as the blanket
- * does, only without swinging. Limits are held by multipliers (augmented Lagrangian). Friction is Coulomb's
- * law in increments: every contact has a tangential spring that slides on the cone of its normal force.
- * Without inertia it is not the same sliding as in the blanket: with friction there are many resting shapes.
+ * does, only without swinging. Limits are held by multipliers (augmented Lagrangian); Newton's steps use the
+ * exact Hessian as far as it is positive definite. Friction is Coulomb's law in increments: every contact has
+ * a tangential spring that slides on the cone of its normal force, anchored where contact began; what slides
+ * drags the anchor along. Without inertia it is not the same sliding as in the blanket: with friction there
+ * are many resting shapes. Without friction and without anything to hold it a sheet may have none: the report
+ * says so.
  *
  * Deterministic: the same calls give the same bits. Objects are independent; one serves one thread at a time.
  */
@@ -17,6 +20,7 @@
 #define MORPH_SETTLE_H
 
 #include "model/attraction.h"
+#include "model/distance.h"
 #include "model/sdf.h"
 #include "model/structure.h"
 
@@ -29,15 +33,30 @@ typedef struct morph_settle_def {
     double softening; /* of all centres, m; 0: one spacing */
     const int *fixed; /* joint numbers, copied */
     int fixed_joints;
-    double tolerance; /* residual force in units of the load (below) */
+    /* Of the same target, or NULL: the deepest places of links and skin are then found and held by exact
+     * distances, where the smooth ones round its edges. Must outlive the object. */
+    const morph_distance *exact;
+    double
+        tolerance; /* residual force on a joint, in its weights (but at least 1e-3 of it in loads, below) */
     int most_steps;
 } morph_settle_def;
 
-/* gravity 9.81, no friction, no base, no centres, tolerance 1e-6, 400 steps. */
+/* gravity 9.81, no friction, no base, no centres, tolerance 1e-6, 1000 steps. */
 morph_settle_def morph_settle_defaults(void);
 
+typedef enum morph_settle_outcome {
+    MORPH_SETTLE_RESTS, /* residual and limits within their tolerances */
+    MORPH_SETTLE_FALLS, /* no rest exists: it lost the target and falls with nothing beneath */
+    MORPH_SETTLE_MOVES, /* most_steps done, and it still slides or falls */
+    MORPH_SETTLE_STALLS /* most_steps done, forces left over that do not move it: contacts change to and fro
+                         */
+} morph_settle_outcome;
+/* In words, for messages. */
+const char *morph_settle_outcome_text(morph_settle_outcome outcome);
+
 typedef struct morph_settle_report {
-    bool converged;               /* residual and limits within their tolerances */
+    morph_settle_outcome outcome;
+    bool converged;               /* outcome is MORPH_SETTLE_RESTS */
     bool stable;                  /* converged, and the reduced tangent stiffness is positive definite */
     int steps;                    /* implicit steps */
     int iterations;               /* Newton iterations */
@@ -51,7 +70,8 @@ typedef struct morph_settle_report {
     double worst_length;    /* m */
     double worst_post;      /* relative */
     double worst_angle;     /* in cosine */
-    double worst_clearance; /* m, by the smooth distance over whole links and triangles, and the base plane */
+    double worst_clearance; /* m, over whole links and triangles (by the exact distance if given), and the
+                               base plane */
     double energy;          /* gravity, springs, attraction, J */
     double seconds, linear_seconds;
 } morph_settle_report;

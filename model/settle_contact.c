@@ -18,16 +18,26 @@
 enum { LATTICE = 4 };
 #define LEAST_STRIDE 1e-4
 /* A seeker this close in weight to a new deepest point moves there and takes its force along. */
-#define SAME_PLACE 0.02
+#define SAME_PLACE 1e-3
 
 /* Weights below this are on the element's border, curvatures below that (per spacing) are flat. */
 #define EDGE 1e-3
 #define FLAT 1e-3
 /* Seekers without a force and further off than this are free again. */
 #define FORGET 0.05
-/* Kinetic friction in parts of static friction: what has slid comes to rest inside its cone, so that the last
- * small changes of a contact's force do not set it sliding again. */
-#define KINETIC 0.9
+#define LEAST_CONE 0.9
+/* A sliding contact drags the place where its friction spring hangs along, this far behind (spacings). */
+#define ROPE 0.02
+/* What stands no further off keeps that place: contacts that share a load pass it to and fro. */
+#define LOOSE 1e-3
+
+/* Friction's most force follows the contact's, but not its last changes: while it lies between LEAST_CONE and
+ * all of what Coulomb's law allows it stays. Where friction itself presses a contact on, following at once is
+ * a feedback that need not settle; any force within the cone holds at rest. */
+static void set_cone(const morph_settle *s, morph_settle_place *p) {
+    const double most = s->friction * p->push * p->slope;
+    if (!(p->cone <= most && p->cone >= LEAST_CONE * most)) p->cone = 0.5 * (1.0 + LEAST_CONE) * most;
+}
 
 static void add_place(morph_settle *s, const int *joint, int corners, const double *weight, double radius) {
     morph_settle_place *p = &s->place[s->places++];
@@ -115,7 +125,18 @@ static double distance(const morph_settle *s, const double q[3], double *g, doub
     return phi;
 }
 
+static double exact_distance(const morph_settle *s, const double q[3], double *g) {
+    double p[3];
+    morph_closest at;
+    for (int k = 0; k < 3; k++)
+        p[k] = q[k] * s->length_unit;
+    morph_distance_point(s->exact, p, &at);
+    if (g) memcpy(g, at.normal, sizeof at.normal);
+    return at.distance / s->length_unit;
+}
+
 static double true_gap(const morph_settle *s, const morph_settle_place *p, const double q[3], double *g) {
+    if (p->seeks && s->exact) return exact_distance(s, q, g) - p->radius;
     if (!p->plane) return distance(s, q, g, NULL) - p->radius;
     if (g) g[0] = g[1] = 0.0, g[2] = 1.0;
     return q[2] - s->base - p->radius;
@@ -269,8 +290,10 @@ void morph_settle_begin(morph_settle *s, const double *x) {
         morph_settle_place *p = &s->place[n];
         double g[3];
         p->near = false;
-        p->cone = 0.0;
-        if (!p->used) continue;
+        if (!p->used) {
+            p->cone = 0.0;
+            continue;
+        }
         place_of(x, p->joint, p->corners, p->weight, p->at);
         p->gap = true_gap(s, p, p->at, g);
         p->near = p->push > 0.0 || p->gap < NEAR;
@@ -280,7 +303,7 @@ void morph_settle_begin(morph_settle *s, const double *x) {
         const double off = morph_dot(p->slip, p->normal);
         for (int k = 0; k < 3; k++)
             p->anchor[k] = p->at[k] - (p->slip[k] - off * p->normal[k]);
-        p->cone = s->friction * p->push * p->slope;
+        set_cone(s, p);
     }
 }
 
@@ -290,19 +313,19 @@ static void new_slip(const morph_settle *s, morph_settle_place *p, const double 
     const double off = morph_dot(u, p->normal);
     for (int k = 0; k < 3; k++)
         u[k] -= off * p->normal[k];
-    const double way = morph_norm(u), most = p->cone / s->grip;
+    const double way = morph_norm(u), most = fmax(p->cone / s->grip, ROPE);
     for (int k = 0; k < 3; k++)
-        p->slip[k] = way > most ? u[k] * KINETIC * most / way : u[k];
+        p->slip[k] = way > most ? u[k] * most / way : u[k];
 }
 
 void morph_settle_slide(morph_settle *s, const double *x) {
     for (int n = 0; n < s->places; n++) {
         morph_settle_place *p = &s->place[n];
         double q[3];
-        if (p->near && p->cone > 0.0) {
-            place_of(x, p->joint, p->corners, p->weight, q);
+        place_of(x, p->joint, p->corners, p->weight, q);
+        if (p->near && (p->cone > 0.0 || gap_of(s, p, q, NULL, NULL) < LOOSE))
             new_slip(s, p, q);
-        } else
+        else
             memset(p->slip, 0, sizeof p->slip);
     }
 }
@@ -318,7 +341,7 @@ double morph_settle_update_contacts(morph_settle *s, const double *x) {
         if (clear(p, q)) continue;
         const double gap = gap_of(s, p, q, NULL, NULL);
         p->push = fmax(0.0, p->push - s->stiff * gap);
-        p->cone = s->friction * p->push * p->slope;
+        set_cone(s, p);
         worst = fmax(worst, -gap);
     }
     return worst;
@@ -370,6 +393,20 @@ static double deepest(const morph_settle *s, const morph_settle_element *e, cons
     return least;
 }
 
+static double deepest_exact(const morph_settle *s, const morph_settle_element *e, const double *x,
+                            double weight[3]) {
+    double v[3][3];
+    morph_closest at;
+    for (int j = 0; j < e->corners; j++) {
+        weight[j] = 1.0 / e->corners;
+        for (int k = 0; k < 3; k++)
+            v[j][k] = x[3 * e->joint[j] + k] * s->length_unit;
+    }
+    morph_distance_element(s->exact, (const double(*)[3])v, e->corners, e->radius * s->length_unit, weight,
+                           &at);
+    return at.distance / s->length_unit;
+}
+
 /* The seeker to put at `weight`: one close by, else a free one, else the one that carries least. */
 static morph_settle_place *seeker_for(morph_settle *s, const morph_settle_element *e,
                                       const double weight[3]) {
@@ -401,7 +438,8 @@ double morph_settle_seek(morph_settle *s, const double *x, double tolerance) {
             morph_settle_place *p = &s->place[e->first + k];
             if (p->push == 0.0 && p->gap > FORGET) p->used = false;
         }
-        const double depth = e->radius - deepest(s, e, x, weight);
+        const double depth =
+            e->radius - (s->exact ? deepest_exact(s, e, x, weight) : deepest(s, e, x, weight));
         worst = fmax(worst, depth);
         if (!(depth > tolerance)) continue;
         morph_settle_place *p = seeker_for(s, e, weight);

@@ -270,7 +270,7 @@ void morph_settle_forget(morph_settle *s) {
         s->angle[n].push[0] = s->angle[n].push[1] = 0.0;
     for (int n = 0; n < s->places; n++) {
         morph_settle_place *p = &s->place[n];
-        p->push = 0.0;
+        p->push = p->cone = 0.0;
         memset(p->slip, 0, sizeof p->slip);
     }
     for (int n = 0; n < s->elements; n++)

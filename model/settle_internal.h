@@ -60,6 +60,7 @@ typedef enum morph_settle_form {
 struct morph_settle {
     const morph_structure *structure;
     const morph_sdf *sdf;
+    const morph_distance *exact; /* or NULL */
     int joints, angles, places, elements, attractors;
     double length_unit, load; /* m, N */
     double weight;            /* of a joint */
@@ -82,6 +83,11 @@ struct morph_settle {
     double stiff_angle;  /* per cosine^2 */
     double grip;         /* of the friction springs */
     double drag;         /* 1 / implicit step: 0.5 drag |x - before|^2 */
+    double least_drag;   /* that steps may come down to now */
+    double best;         /* least force left over lately */
+    int best_age;        /* steps since */
+    double nearest;      /* joint to the target, m, while nothing is held */
+    int falling;         /* steps away from it without contact */
     double *before;      /* 3*joints */
 
     double *x, *trial, *g, *d; /* 3*joints */
@@ -90,7 +96,7 @@ struct morph_settle {
     morph_sparse *sparse;
     bool factored; /* sparse holds the factor of the resting shape, spare its Hessian without penalties */
 
-    int exact_after; /* iterations for which the exact Hessian is not tried again */
+    double share; /* of the Hessian's indefinite part in the last factor */
     int iterations;
     double linear_seconds;
 };

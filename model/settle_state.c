@@ -14,7 +14,7 @@
 #define GRIP 1e4
 
 morph_settle_def morph_settle_defaults(void) {
-    return (morph_settle_def){.gravity = 9.81, .base = NAN, .tolerance = 1e-6, .most_steps = 400};
+    return (morph_settle_def){.gravity = 9.81, .base = NAN, .tolerance = 1e-6, .most_steps = 1000};
 }
 
 static bool def_ok(const morph_structure *s, const morph_settle_def *d) {
@@ -132,6 +132,7 @@ morph_status morph_settle_create(const morph_structure *structure, const morph_s
     if (!s) return MORPH_ERR_NOMEM;
     s->structure = structure;
     s->sdf = sdf;
+    s->exact = sdf ? def->exact : NULL;
     s->joints = structure->joints;
     s->angles = structure->link_posts + structure->link_links;
     s->attractors = def->attractors;

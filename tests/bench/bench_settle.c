@@ -88,8 +88,9 @@ static void settle_line(const char *name, scene *s, morph_settle *settle, bool w
     printf(
         "%s%s%s: %.2f of the dynamics; %d steps, %d iterations, %d factorisations so far, %d analysis, "
         "linear solver %.0f %%, %d contacts, %d saddles\n",
-        status == MORPH_OK ? "" : morph_status_text(status), r.converged ? "converged" : "NOT converged",
-        r.stable ? ", stable" : "", r.seconds / dynamics, r.steps, r.iterations, r.factorisations, r.analyses,
+        status == MORPH_OK ? "" : morph_status_text(status),
+        r.converged ? "converged" : morph_settle_outcome_text(r.outcome), r.stable ? ", stable" : "",
+        r.seconds / dynamics, r.steps, r.iterations, r.factorisations, r.analyses,
         100.0 * r.linear_seconds / r.seconds, r.contacts, r.saddles);
     printf("                 residual %.1e weights, length %.1e m, post %.1e, angle %.1e, clearance %.1e m\n",
            r.residual, r.worst_length, r.worst_post, r.worst_angle, r.worst_clearance);
@@ -101,6 +102,7 @@ static void compare(scene *s) {
     morph_settle_def sd = morph_settle_defaults();
     sd.friction = def.friction;
     sd.base = 0.0;
+    sd.exact = s->exact;
     morph_trajectory t = {0};
     morph_blanket_report report = {0};
     morph_settle *settle = NULL;
@@ -132,6 +134,7 @@ static morph_settle *without_friction(const scene *s, const morph_attractor c[2]
     morph_settle_def sd = morph_settle_defaults();
     morph_settle *settle = NULL;
     sd.base = 0.0;
+    sd.exact = s->exact;
     sd.attractor = c;
     sd.attractors = 2;
     return morph_settle_create(s->structure, s->sdf, &sd, &settle) == MORPH_OK ? settle : NULL;

@@ -28,30 +28,55 @@ static inline morph_structure_def scene_structure(int nodes, double stiffness) {
     return def;
 }
 
-/* Sizes as in examples/scenes: a box half as wide as the grid, a sphere of 0.6 of its width. */
-static inline void scene_make(scene *s, const morph_structure_def *def, bool sphere) {
+/* Stands `mesh`, which is freed, on the plane and the grid a spacing above its `height`. */
+static inline void scene_place(scene *s, const morph_structure_def *def, morph_mesh *mesh, double height) {
     *s = (scene){0};
     assert_int_equal(morph_structure_create(def, &s->structure), MORPH_OK);
-    const double a = def->spacing, width = a * (def->nodes[0] - 1), r = 0.3 * width;
-    const double size[3] = {0.5 * width, 0.5 * width, 0.3 * width}, radii[3] = {r, r, r};
-    const double height = sphere ? 2.0 * r : size[2];
-    morph_mesh mesh;
-    assert_int_equal(sphere ? morph_mesh_ellipsoid(radii, 0.002 * a, &mesh) : morph_mesh_box(size, &mesh),
-                     MORPH_OK);
-    for (int i = 0; i < mesh.vertices; i++)
-        mesh.v[3 * i + 2] += 0.5 * height;
-    assert_int_equal(morph_distance_create(&mesh, true, &s->exact), MORPH_OK);
-    morph_mesh_free(&mesh);
+    const double a = def->spacing, half = 0.5 * a * (def->nodes[0] - 1) + a;
+    double low = INFINITY;
+    for (int i = 0; i < mesh->vertices; i++)
+        low = fmin(low, mesh->v[3 * i + 2]);
+    for (int i = 0; i < mesh->vertices; i++)
+        mesh->v[3 * i + 2] -= low;
+    assert_int_equal(morph_distance_create(mesh, true, &s->exact), MORPH_OK);
+    morph_mesh_free(mesh);
     s->n = 3 * s->structure->joints;
     s->bytes = (size_t)s->n * sizeof(double);
     s->start = malloc(s->bytes);
     s->x = malloc(s->bytes);
     assert_true(s->start && s->x);
-    const double half = 0.5 * width + a;
     const double lo[3] = {-half, -half, -0.5 * a}, hi[3] = {half, half, height + 2.5 * a};
     for (int i = 0; i < s->n; i++)
         s->start[i] = s->x[i] = s->structure->start[i] + (i % 3 == 2 ? height + a : 0.0);
     assert_int_equal(morph_sdf_create(s->exact, lo, hi, a / 16.0, NULL, &s->sdf), MORPH_OK);
+}
+
+/* Sizes as in examples/scenes: a box half as wide as the grid, a sphere of 0.6 of its width. */
+static inline void scene_make(scene *s, const morph_structure_def *def, bool sphere) {
+    const double width = def->spacing * (def->nodes[0] - 1), r = 0.3 * width;
+    const double size[3] = {0.5 * width, 0.5 * width, 0.3 * width}, radii[3] = {r, r, r};
+    morph_mesh mesh;
+    assert_int_equal(sphere ? morph_mesh_ellipsoid(radii, 0.002 * def->spacing, &mesh)
+                            : morph_mesh_box(size, &mesh),
+                     MORPH_OK);
+    scene_place(s, def, &mesh, sphere ? 2.0 * r : size[2]);
+}
+
+/* A saddle z = h (x^2 - y^2) / w^2 over a block 0.7 of the grid wide. */
+static inline void scene_saddle(scene *s, const morph_structure_def *def) {
+    enum { ROWS = 33 };
+    const double width = def->spacing * (def->nodes[0] - 1), half = 0.35 * width, rise = 0.12 * width;
+    double *z = malloc(ROWS * ROWS * sizeof *z);
+    assert_non_null(z);
+    for (int r = 0; r < ROWS; r++)
+        for (int c = 0; c < ROWS; c++) {
+            const double x = 2.0 * c / (ROWS - 1) - 1.0, y = 2.0 * r / (ROWS - 1) - 1.0;
+            z[r * ROWS + c] = 2.0 * rise + rise * (x * x - y * y);
+        }
+    morph_mesh mesh;
+    assert_int_equal(morph_mesh_heightmap(z, ROWS, ROWS, 2.0 * half / (ROWS - 1), 0.0, &mesh), MORPH_OK);
+    free(z);
+    scene_place(s, def, &mesh, 3.0 * rise);
 }
 
 static inline void scene_free(scene *s) {

@@ -1,0 +1,27 @@
+/* Settle with friction on a grid of 16 x 16 over a sphere; with an argument over a box or a saddle instead
+ * (each takes some ten seconds): test_settle_large [box|saddle]. */
+#include "settle_check.h"
+
+static void sphere(void **state) {
+    (void)state;
+    rest(16, SPHERE, 0.4, NULL, 0);
+}
+
+static void box(void **state) {
+    (void)state;
+    rest(16, BOX, 0.4, NULL, 0);
+}
+
+static void saddle(void **state) {
+    (void)state;
+    rest(16, SADDLE, 0.4, NULL, 0);
+}
+
+int main(int argc, char **argv) {
+    const char *name = argc > 1 ? argv[1] : "sphere";
+    const struct CMUnitTest over_sphere[] = {cmocka_unit_test(sphere)}, over_box[] = {cmocka_unit_test(box)},
+                            over_saddle[] = {cmocka_unit_test(saddle)};
+    if (strcmp(name, "box") == 0) return cmocka_run_group_tests(over_box, NULL, NULL);
+    if (strcmp(name, "saddle") == 0) return cmocka_run_group_tests(over_saddle, NULL, NULL);
+    return cmocka_run_group_tests(over_sphere, NULL, NULL);
+}
