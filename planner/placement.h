@@ -45,7 +45,6 @@ typedef struct morph_placement {
     morph_measure seeded, reached; /* of the blanket under the seeds, and at the end of guided */
     int rounds, accepted;
     morph_effort effort;
-    int jacobian_nonzeros, hessian_nonzeros;
     /* The last program, at last_epsilon: how it ended, what was recomputed from its point alone (units: a
      * joint's weight, spacings), and how far its shape is from the one that the blanket then reaches (rms
      * over the joints, spacings). */

@@ -17,6 +17,8 @@ void morph_effort_add(morph_effort *e, const morph_nlp_result *result) {
     if (result->rows > e->rows) {
         e->rows = result->rows;
         e->unknowns = result->unknowns;
+        e->jacobian_nonzeros = result->jacobian_nonzeros;
+        e->hessian_nonzeros = result->hessian_nonzeros;
     }
 }
 

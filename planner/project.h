@@ -11,7 +11,7 @@ extern const double morph_pose_tolerance[MORPH_LIMITS];
 /* Running totals of solves; add to what is there. */
 typedef struct morph_effort {
     int solves, iterations;
-    int unknowns, rows; /* of the largest solve */
+    int unknowns, rows, jacobian_nonzeros, hessian_nonzeros; /* of the largest solve */
     double linear_seconds, callback_seconds;
 } morph_effort;
 void morph_effort_add(morph_effort *effort, const morph_nlp_result *result);

@@ -185,9 +185,6 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
         morph_log(r->options->control, "refine: %s", message);
         return status;
     }
-    const morph_nlp_size size = morph_nlp_sizes(nlp);
-    r->report->jacobian_nonzeros = size.jacobian_nonzeros;
-    r->report->hessian_nonzeros = size.hessian_nonzeros;
     morph_nlp_options o = morph_nlp_defaults();
     /* Early rounds only steer: they are solved again with more rows. The objective is of order 1 (spacings^2
      * of area times gap^2), so 1e-5 in its gradient moves the gap by far less than a thousandth of a spacing.

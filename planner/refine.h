@@ -26,7 +26,6 @@ morph_refine_options morph_refine_defaults(void);
 typedef struct morph_refine_report {
     int rounds, rows_possible;
     morph_effort effort; /* of all solves */
-    int jacobian_nonzeros, hessian_nonzeros;
     double seconds;
     bool feasible;             /* by the exact examination of the returned pose, inset not counted */
     morph_violation violation; /* of the returned pose */

@@ -104,7 +104,7 @@ typedef struct morph_nlp_result {
     double objective; /* recomputed from x */
     double violation; /* worst over rows and bounds, recomputed from x */
     int worst_row;    /* global row of it; -1: a bound or none */
-    int unknowns, rows;
+    int unknowns, rows, jacobian_nonzeros, hessian_nonzeros;
     /* The best point: feasible with the least objective if any was seen, else the least violating. Ipopt's
      * last point goes before a kept one that is lower by no more than its violation within the tolerance can
      * buy. */

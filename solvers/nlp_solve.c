@@ -222,6 +222,9 @@ static morph_status conclude(morph_nlp *nlp, const morph_nlp_options *o, morph_r
     out->callback_seconds = run->callback_seconds;
     out->unknowns = run->unknowns;
     out->rows = run->rows;
+    const morph_nlp_size size = morph_nlp_sizes(nlp);
+    out->jacobian_nonzeros = size.jacobian_nonzeros;
+    out->hessian_nonzeros = size.hessian_nonzeros;
     out->objective = best.objective;
     const morph_status rows = morph_nlp_rows_at(nlp, best.x);
     if (rows != MORPH_OK) return rows;

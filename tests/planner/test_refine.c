@@ -60,7 +60,7 @@ static void lowers(const solid *body, double top, double gain, double slack) {
     morph_refine_report_free(&r);
     assert_int_equal(morph_refine(&f.world, &o, x, &r), MORPH_OK);
     assert_true(r.feasible && r.rounds >= 1 && r.effort.solves >= r.rounds);
-    assert_true(r.jacobian_nonzeros > 0 && r.hessian_nonzeros > 0 &&
+    assert_true(r.effort.jacobian_nonzeros > 0 && r.effort.hessian_nonzeros > 0 &&
                 r.rows_possible == morph_possible_rows(f.s));
     assert_metres_within(&f, x, slack);
     const double after = objective(&f, x);
