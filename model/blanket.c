@@ -216,7 +216,7 @@ static void resisting(const morph_blanket_state *b, morph_blanket_report *report
         report->held_element = l;
     }
     for (int t = 0; t < b->angles && most == 0.0; t++)
-        if (fmax(b->angle[t].push[0], b->angle[t].push[1]) > 0.0) {
+        if (fmax(b->turn[t].push[0], b->turn[t].push[1]) > 0.0) {
             report->held_by = MORPH_BLANKET_ANGLE;
             report->held_element = t;
         }

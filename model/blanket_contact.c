@@ -31,6 +31,10 @@
 /* Nor than by this part of its radius: targets as thin as that turn their distance within it. */
 #define KEEP_RADIUS 0.1
 
+/* An element's place whose distance exceeds a lower bound for the whole element by no more than this,
+ * spacings, is its deepest: a thousandth of what counts as held. */
+#define TIGHT 1e-6
+
 static morph_touch *add_touch(morph_blanket_state *b, int span, const int *joint, int corners,
                               const double *weight, double radius) {
     morph_touch *t = &b->touch[b->touches++];
@@ -92,11 +96,15 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     return MORPH_OK;
 }
 
-static void place_of(const double *x, const int *joint, int corners, const double *weight, double q[3]) {
-    for (int k = 0; k < 3; k++) {
-        q[k] = 0.0;
-        for (int j = 0; j < corners; j++)
-            q[k] += weight[j] * x[3 * joint[j] + k];
+static inline void place_of(const double *x, const int *joint, int corners, const double *weight,
+                            double q[3]) {
+    const double *a = &x[3 * joint[0]], wa = weight[0];
+    for (int k = 0; k < 3; k++)
+        q[k] = wa * a[k];
+    for (int j = 1; j < corners; j++) {
+        const double *c = &x[3 * joint[j]], wc = weight[j];
+        for (int k = 0; k < 3; k++)
+            q[k] += wc * c[k];
     }
 }
 
@@ -130,10 +138,13 @@ static double distance_of(const morph_blanket_state *b, morph_touch *t, const do
 
 /* One round of a compass search in the weights: the place moves a stride towards the corner that brings it
  * deepest, or the stride shrinks. Kept from step to step, it follows the deepest place of the element. */
-static double seek(const morph_blanket_state *b, morph_touch *t, const double *x, double value) {
+static double seek(const morph_blanket_state *b, morph_touch *t, const double *x, const double at[3],
+                   double value) {
     double best[3], lowest = value;
     for (int j = 0; j < t->corners; j++) {
         double weight[3], q[3];
+        morph_sub(&x[3 * t->joint[j]], at, q);
+        if (morph_dot(t->gradient, q) > 0.0) continue; /* the distance grows that way */
         for (int k = 0; k < t->corners; k++)
             weight[k] = (1.0 - t->stride) * t->weight[k] + (k == j ? t->stride : 0.0);
         place_of(x, t->joint, t->corners, weight, q);
@@ -220,12 +231,12 @@ static bool swept(const morph_blanket_state *b, morph_contact *c, const double *
     return false;
 }
 
-/* How far the place is from where it would have to be listed, at least: by its last distance and what it has
- * moved since; negative where that cannot tell. */
-static double spare_since(const morph_blanket_state *b, const morph_touch *t, const double q[3],
-                          double listed) {
+/* How far the place is from contact, at least: by its last distance and what it has moved since, `by`;
+ * negative where that cannot tell. */
+static double spare_since(const morph_blanket_state *b, const morph_touch *t, const double q[3], double *by) {
     const double p[3] = {q[0], q[1], q[2] - b->lift_to};
-    return t->known ? (t->phi - t->radius - listed) / MOST_SLOPE - morph_dist(p, t->at) : -1.0;
+    *by = t->known ? morph_dist(p, t->at) : INFINITY;
+    return (t->phi - t->radius) / MOST_SLOPE - *by;
 }
 
 bool morph_blanket_sleeps(const morph_blanket_state *b, int touch) {
@@ -246,7 +257,16 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     place_of(x, t->joint, t->corners, t->weight, q);
     place_of(b->before, t->joint, t->corners, t->weight, from);
     const double own = listed + morph_dist(q, from) + lift;
-    if (t->stride == 0.0 && spare_since(b, t, q, own) > 0.0) return;
+    if (t->stride == 0.0) {
+        double by;
+        const double spare = spare_since(b, t, q, &by);
+        if (spare > reach) {
+            *wake = been + spare - b->move[t->span] - lift;
+            return;
+        }
+        /* Not while a new distance would let it sleep. */
+        if (spare > own / MOST_SLOPE && spare + by < reach) return;
+    }
     const bool moved = has_moved(b, t, q);
     double gap = distance_of(b, t, q, NULL) - t->radius;
     if (t->stride == 0.0 && gap / MOST_SLOPE > reach) {
@@ -255,7 +275,7 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     }
     /* What rests has found its deepest place; exact distances look after it from frame to frame. */
     if (t->stride > SHORTEST_STRIDE || (t->stride > 0.0 && moved))
-        gap = seek(b, t, x, gap + t->radius) - t->radius;
+        gap = seek(b, t, x, q, gap + t->radius) - t->radius;
     if (gap > own) {
         if (t->stride > 0.0) *wake = been + (gap - listed) / 8.0;
         return;
@@ -291,7 +311,7 @@ static void find_base(morph_blanket_state *b, const double *x, double move) {
 
 void morph_blanket_forget(morph_blanket_state *b) {
     for (int t = 0; t < b->angles; t++)
-        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+        b->turn[t].push[0] = b->turn[t].push[1] = 0.0;
     memset(b->touch_wake, 0, (size_t)b->touches * sizeof *b->touch_wake);
     memset(b->span_wake, 0,
            (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake);
@@ -362,7 +382,8 @@ double morph_blanket_project_contact(morph_contact *c, double *x, double frictio
     const double gap = morph_dot(c->normal, q) - c->level;
     const double old = c->push;
     if (gap_out) *gap_out = gap;
-    c->push = fmax(0.0, old - gap * c->inverse);
+    const double push = old - gap * c->inverse;
+    c->push = push > 0.0 ? push : 0.0;
     if (c->push == 0.0 && old == 0.0) return 0.0;
     for (int k = 0; k < 3; k++) {
         change[k] = (c->push - old) * c->normal[k];
@@ -464,6 +485,45 @@ static void measure(const morph_blanket_state *b, const element *e, const double
     memo->known = memo->fresh = true;
 }
 
+/* Height of the lowest corner over the plane through the memo's closest point. */
+static double height_over(const morph_memo *memo, const double v[3][3], int corners) {
+    double least = INFINITY;
+    for (int k = 0; k < corners; k++) {
+        double d[3];
+        morph_sub(v[k], memo->point, d);
+        const double height = morph_dot(memo->normal, d);
+        if (height < least) least = height;
+    }
+    return least;
+}
+
+/* Over a convex target one point's distance may be enough: the target lies behind the plane through the point
+ * closest to a place outside, so that no point of the element is nearer than its lowest corner's height over
+ * that plane. Where that is the place's own distance the place is the deepest; where it is outside nobody asks
+ * for more. False, with the memo as it was, where the element must be measured. */
+static bool measure_convex(const morph_blanket_state *b, const element *e, const double v[3][3],
+                           morph_memo *memo) {
+    static const int corner[3] = {0, 1, 2};
+    const double spacing = b->structure->spacing;
+    morph_memo now = *memo;
+    morph_closest at;
+    double q[3];
+    if (!b->convex || !memo->known) return false;
+    place_of(v[0], corner, e->corners, memo->weight, q);
+    morph_distance_point(b->exact, q, &at);
+    if (!(at.distance > TIGHT * spacing)) return false;
+    memcpy(now.normal, at.normal, sizeof now.normal);
+    memcpy(now.point, at.point, sizeof now.point);
+    const double height = height_over(&now, v, e->corners);
+    now.bounded = at.distance - height > TIGHT * spacing;
+    if (now.bounded && height < e->radius - 0.5 * MORPH_BLANKET_CLEARANCE_HELD * spacing) return false;
+    now.gap = height - e->radius;
+    now.fresh = !now.bounded;
+    *memo = now;
+    memcpy(memo->corner, v, sizeof memo->corner);
+    return true;
+}
+
 static double moved_since(const morph_memo *memo, const double v[3][3], int corners) {
     double moved = 0.0;
     for (int k = 0; k < corners; k++)
@@ -472,20 +532,15 @@ static double moved_since(const morph_memo *memo, const double v[3][3], int corn
 }
 
 /* What moved has come nearer by no more than it moved. A convex target lies wholly behind the plane through
- * the closest point: an element that slides along it stays clear however far. */
+ * the point closest to anything outside, be it the deepest place or not: an element that slides along it stays
+ * clear however far. */
 double morph_blanket_gap_bound(const morph_blanket_state *b, int n, const double v[3][3]) {
     const morph_memo *memo = &b->memo[n];
     const element e = element_of(b->structure, n);
     if (!memo->known) return -INFINITY;
     const double bound = memo->gap - moved_since(memo, v, e.corners);
-    if (!b->convex || memo->bounded || !(memo->gap + e.radius > 0.0)) return bound;
-    double least = INFINITY;
-    for (int k = 0; k < e.corners; k++) {
-        double d[3];
-        morph_sub(v[k], memo->point, d);
-        least = fmin(least, morph_dot(memo->normal, d));
-    }
-    return fmax(bound, least - e.radius);
+    if (!b->convex || !(memo->gap + e.radius > 0.0)) return bound;
+    return fmax(bound, height_over(memo, v, e.corners) - e.radius);
 }
 
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
@@ -501,7 +556,7 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
         const double bound = morph_blanket_gap_bound(b, n, (const double(*)[3])v);
         depth = fmax(depth, bound >= -allowed ? -bound : 0.0);
         if (bound >= -allowed) continue;
-        measure(b, &e, (const double(*)[3])v, memo);
+        if (!measure_convex(b, &e, (const double(*)[3])v, memo)) measure(b, &e, (const double(*)[3])v, memo);
         depth = fmax(depth, -memo->gap);
     }
     return depth;

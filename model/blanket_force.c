@@ -76,7 +76,7 @@ static void add_squares(morph_blanket_state *b) {
     for (int t = 0; t < b->structure->link_posts; t++) {
         const morph_angle *a = &b->angle[t];
         double c, grad[4][3];
-        if (!morph_blanket_cosine_gradient(a, b->x, &c, grad)) continue;
+        if (!morph_blanket_cosine_gradient(b, t, b->x, &c, grad)) continue;
         for (int j = 0; j < a->joints; j++)
             for (int k = 0; k < 3; k++)
                 b->a[3 * a->joint[j] + k] -= scale * c * grad[j][k];
@@ -129,7 +129,7 @@ double morph_blanket_energy(const morph_blanket_state *b) {
     const double square = square_of(b->structure, &b->def);
     double kinetic, spring, height = 0.0, attraction = 0.0, angles = morph_blanket_angle_energy(b);
     for (int t = 0; t < b->structure->link_posts && square > 0.0; t++) {
-        const double c = morph_blanket_cosine(&b->angle[t], b->x);
+        const double c = morph_blanket_cosine(b, t, b->x);
         angles += 0.5 * square * c * c;
     }
     morph_blanket_energies(b, &kinetic, &spring);
@@ -184,7 +184,7 @@ static void damp(morph_blanket_state *b, double h, bool backward) {
         if (k < b->links)
             damp_pair(b, b->structure->link[k], link);
         else
-            damp_pair(b, b->angle[k - b->links].far, angle);
+            damp_pair(b, b->angle_far[k - b->links], angle);
     }
 }
 

@@ -40,16 +40,20 @@ typedef struct morph_contact {
     double drag[3];   /* accumulated friction, at most friction * push */
 } morph_contact;
 
-/* Angle between u and v as floor <= cos <= ceiling; joint[k] enters u with su[k] and v with sv[k]. */
+/* What every complete sweep asks of an angle between u and v, floor <= cos <= ceiling: apart from the rest, so
+ * that the many that are in no need of correction stay in the cache. */
+typedef struct morph_turn {
+    int u[2], v[2];        /* an arm leads from its first joint to its second */
+    double floor, ceiling; /* aimed at, a little inside */
+    double push[2];        /* accumulated corrections of this step: at floor, at ceiling */
+} morph_turn;
+
+/* The rest of it; joint[k] enters u with su[k] and v with sv[k]. */
 typedef struct morph_angle {
     int joint[4], joints;
-    int u[2], v[2]; /* an arm leads from its first joint to its second */
-    int far[2];     /* where the arms end */
     double su[4], sv[4];
     double weight[4];       /* of its joints */
-    double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
-    double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
     /* As the last complete sweep found it: cos = level + sum grad.x, and 1 / sum |grad|^2. */
     double grad[4][3], level, inverse, size, most;
     bool linear; /* these are known */
@@ -78,7 +82,7 @@ typedef struct morph_memo {
     double corner[3][3], gap;
     double weight[3];           /* of the deepest place */
     double normal[3], point[3]; /* there: gradient of the distance, closest point of the target */
-    bool bounded;               /* gap is only a lower bound: all but corner and gap are not known */
+    bool bounded; /* gap is only a lower bound, the others are of some other place of the element */
     int touch;                  /* the place that seeks on it */
     bool known, fresh;          /* fresh: taken since the last morph_blanket_seek_deepest */
 } morph_memo;
@@ -140,7 +144,8 @@ typedef struct morph_blanket_state {
      * the fastest of its corners moved, its move how far in this step, m; lift_path the same of the target.
      */
     double *path, *move, lift_path;
-    int (*angle_ends)[4]; /* of both arms */
+    int (*angle_far)[2]; /* where both arms end, apart from the corner */
+    double *come;        /* joints: path and move of this step */
     /* Path lengths, of links by the sum of their ends', of angles by that of all ends of both arms, before
      * which a link or an angle cannot reach a limit; of places by their span's and the target's, before which
      * they cannot touch; of spans, the least of their places'. */
@@ -154,6 +159,7 @@ typedef struct morph_blanket_state {
     bool hot_backward; /* listed in a backward sweep */
     double added;   /* what sweeps may add to the motion of a step or a frame, m: what is nearer is listed */
     double stirred; /* largest motion by a correction in the last sweep, m */
+    morph_turn *turn; /* angles */
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
     morph_blanket_self *self;
@@ -236,8 +242,9 @@ bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *
                              double grad[4][3]);
 double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
 /* The same with its gradient by the angle's joints, those held 0; false where it has none. */
-bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]);
-double morph_blanket_cosine(const morph_angle *a, const double *x);
+bool morph_blanket_cosine_gradient(const morph_blanket_state *b, int angle, const double *x, double *c,
+                                   double grad[4][3]);
+double morph_blanket_cosine(const morph_blanket_state *b, int angle, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
 /* blanket_polish.c: what the unpolished state breaks. */

@@ -100,7 +100,9 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->touch_wake);
     free(b->span_wake);
     free(b->first_touch);
-    free(b->angle_ends);
+    free(b->angle_far);
+    free(b->turn);
+    free(b->come);
     free(b->path);
     free(b->move);
     free(b->hot_link);
