@@ -359,6 +359,8 @@ morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf
         status = MORPH_ERR_INPUT;
     else
         status = trajectory_create(out, (int)frames, structure->joints);
+    if (status == MORPH_OK && b->convex)
+        status = morph_blanket_hull_create(morph_distance_mesh(b->exact), &b->hull);
     if (status == MORPH_OK) status = run(b, (int)frames, control, out, &local);
     morph_blanket_state_destroy(b);
     if (status != MORPH_OK && status != MORPH_ERR_STOPPED) morph_trajectory_free(out);

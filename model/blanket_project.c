@@ -75,8 +75,8 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
     b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
     b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
-    if (!b->angle_far || !b->turn || !b->come || !b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake ||
-        !b->hot_link || !b->hot_angle)
+    if (!b->angle_far || !b->turn || !b->come || !b->link_wake || !b->near_link || !b->near_angle ||
+        !b->angle_wake || !b->hot_link || !b->hot_angle)
         return MORPH_ERR_NOMEM;
     if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
         return MORPH_ERR_NOMEM;
@@ -178,7 +178,8 @@ static bool project_length(morph_blanket_state *b, int l, double *x, double *mot
     const double hot = HOT_LENGTH * b->structure->spacing;
     *motion = 0.0;
     if (push[0] == 0.0 && push[1] == 0.0 && square > squared(limit[0]) && square < squared(limit[1]))
-        return square < squared(limit[0] + hot) || (limit[1] > hot && square > squared(limit[1] - hot)) || !(limit[1] > hot);
+        return square < squared(limit[0] + hot) || (limit[1] > hot && square > squared(limit[1] - hot)) ||
+               !(limit[1] > hot);
     const double length = sqrt(square);
     if (!(length > 0.0)) return true;
     double grow = unilateral(&push[0], length - limit[0]);

@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* How much the boxes are grown, spacings: far pairs cost next to nothing. */
-#define MARGIN 0.4
+#define MARGIN 0.3
 /* Pairs closer than this beyond what a step moves them are listed: what sweeps may add, spacings. */
 #define LISTED 0.05
 /* Aimed at beyond the sum of the radii, spacings, as the other limits aim inside. */
