@@ -17,6 +17,8 @@
  * spacings, is its deepest: a thousandth of what counts as held. */
 #define TIGHT 1e-6
 
+/* Height over a plane, spacings, with which an element is taken to be clear of it whatever the rounding. */
+#define LEAST_HEIGHT 1e-6
 /* Neighbours of a vertex up to which the climb over a convex target is worth its while. */
 enum { MOST_NEIGHBOURS = 64 };
 
@@ -171,16 +173,16 @@ static bool square_to(const double v[3][3], int corners, const double along[3], 
 
 /* The target lies behind the plane through its vertex furthest along a direction: where that is square to an
  * element lying on it, the element's height over the plane is all of its distance. Notes the plane and that
- * height if it is enough. */
+ * height if it is at least `enough`. */
 static bool clear_of_plane(const morph_blanket_state *b, const element *e, const double v[3][3],
-                           morph_memo *memo) {
+                           double enough, morph_memo *memo) {
     morph_memo now = *memo;
     if (!b->hull || !square_to(v, e->corners, memo->normal, now.normal)) return false;
     const int from = memo->vertex > 0 ? memo->vertex - 1 : b->hull->first;
     memo->vertex = now.vertex = 1 + climb(b->hull, now.normal, from);
     memcpy(now.point, &b->hull->mesh->v[3 * (now.vertex - 1)], sizeof now.point);
     const double height = height_over(&now, v, e->corners);
-    if (!(height >= e->radius - 0.5 * MORPH_BLANKET_CLEARANCE_HELD * b->structure->spacing)) return false;
+    if (!(height >= enough)) return false;
     now.gap = height - e->radius;
     now.bounded = now.planar = true;
     now.fresh = false;
@@ -201,7 +203,8 @@ static bool measure_convex(const morph_blanket_state *b, const element *e, const
     morph_closest at;
     double q[3];
     if (!b->convex || !memo->known) return false;
-    if (clear_of_plane(b, e, v, memo)) return true;
+    const double enough = e->radius - 0.5 * MORPH_BLANKET_CLEARANCE_HELD * spacing;
+    if (clear_of_plane(b, e, v, enough, memo)) return true;
     now.vertex = memo->vertex;
     morph_blanket_place(v[0], corner, e->corners, memo->weight, q);
     morph_distance_point(b->exact, q, &at);
@@ -210,7 +213,7 @@ static bool measure_convex(const morph_blanket_state *b, const element *e, const
     memcpy(now.point, at.point, sizeof now.point);
     const double height = height_over(&now, v, e->corners);
     now.bounded = at.distance - height > TIGHT * spacing;
-    if (now.bounded && height < e->radius - 0.5 * MORPH_BLANKET_CLEARANCE_HELD * spacing) return false;
+    if (now.bounded && height < enough) return false;
     now.gap = height - e->radius;
     now.planar = true;
     now.fresh = !now.bounded;
@@ -236,6 +239,18 @@ double morph_blanket_gap_bound(const morph_blanket_state *b, int n, const double
     const double bound = memo->gap - moved_since(memo, v, e.corners);
     if (!b->convex || !(memo->gap + e.radius > 0.0)) return bound;
     return fmax(bound, height_over(memo, v, e.corners) - e.radius);
+}
+
+void morph_blanket_renew_planes(morph_blanket_state *b) {
+    const morph_structure *s = b->structure;
+    for (int n = 0; n < s->links + s->skin_triangles && b->hull; n++) {
+        const element e = element_of(s, n);
+        double v[3][3] = {{0.0}};
+        if (!e.tested || !b->memo[n].known) continue;
+        place_element(b, b->x, e.joint, e.corners, v);
+        if (morph_blanket_gap_bound(b, n, (const double(*)[3])v) > -e.radius) continue;
+        clear_of_plane(b, &e, (const double(*)[3])v, LEAST_HEIGHT * s->spacing, &b->memo[n]);
+    }
 }
 
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {

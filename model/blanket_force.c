@@ -189,6 +189,9 @@ static double step_work(const morph_blanket_state *b) {
     return work;
 }
 
+/* Steps that move further than this, radii, may be looked at by the guard. */
+#define PLANES_MOVE 0.1
+
 /* What the projection moved becomes velocity, so an impact is plastic and a held constraint carries no speed.
  */
 static void take_velocity(morph_blanket_state *b) {
@@ -221,6 +224,7 @@ static bool drift(morph_blanket_state *b) {
         if (b->changed <= MORPH_BLANKET_SWEPT * b->structure->spacing) break;
     }
     morph_blanket_keep_contacts(b);
+    if (morph_blanket_moved(b, b->x) > PLANES_MOVE * b->structure->def.radius) morph_blanket_renew_planes(b);
     if (!morph_blanket_guard(b)) return false;
     if (b->soft) morph_blanket_soft_moved(b);
     take_velocity(b);

@@ -337,6 +337,8 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
 /* At least how far an element is from the target beyond its radius, by its last exact distance: corners as
  * the target sees them. Negative infinity where nothing is known. */
 double morph_blanket_gap_bound(const morph_blanket_state *b, int element, const double v[3][3]);
+/* Planes anew between a convex target and what those known no longer keep from it at x: for the guard. */
+void morph_blanket_renew_planes(morph_blanket_state *b);
 /* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
  * between the fixed places is then felt by the steps that follow. */
 void morph_blanket_seek_deepest(morph_blanket_state *b);

@@ -15,9 +15,6 @@
 /* Rows whose correction moves no joint further than this, spacings, are left alone until the next complete
  * sweep: a hundredth of the limits' margins. */
 #define STILL 1e-5
-/* Relative error of a post's squared length that is left: some units of rounding, far below
- * MORPH_BLANKET_POST_HELD. */
-#define POST_ROUNDING 1e-14
 /* Every so many sweeps one is complete. */
 #define COMPLETE 6
 
@@ -144,16 +141,13 @@ void morph_blanket_project_posts_along(morph_blanket_state *b) {
     }
 }
 
-/* Posts share no joint, so this one is exact. Most have not been moved since they were last looked at: their
- * length is right but for rounding, which shows without root or division. */
+/* Posts share no joint, so this one is exact. */
 static void project_posts(morph_blanket_state *b, double *x) {
     const morph_structure *s = b->structure;
     for (int p = 0; p < b->posts; p++) {
         double *xb = &x[3 * s->post[p][0]], *xt = &x[3 * s->post[p][1]], d[3];
         morph_sub(xt, xb, d);
-        const double square = morph_dot(d, d), aim = squared(s->post_length[p]);
-        if (fabs(square - aim) <= POST_ROUNDING * aim) continue;
-        const double length = sqrt(square);
+        const double length = morph_norm(d);
         if (!(length > 0.0)) continue;
         note(b, s->post_length[p] - length);
         part(b, s->post[p], xb, xt, d, s->post_length[p] / length - 1.0);
