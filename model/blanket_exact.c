@@ -191,6 +191,18 @@ static bool clear_of_plane(const morph_blanket_state *b, const element *e, const
     return true;
 }
 
+/* Whether the motion feels what is this far from an element: else its deepest place has to be found, so that
+ * the seeking place can go there (morph_blanket_seek_deepest). */
+static bool felt(const morph_blanket_state *b, const element *e, const double v[3][3],
+                 const morph_memo *memo) {
+    static const int corner[3] = {0, 1, 2};
+    const double spacing = b->structure->spacing;
+    double q[3];
+    if (!b->sdf || memo->gap > NEAR * spacing) return true;
+    morph_blanket_place(v[0], corner, e->corners, b->touch[memo->touch].weight, q);
+    return memo->gap > morph_sdf_eval(b->sdf, q, NULL, NULL) - e->radius - SEEK_GAIN * spacing;
+}
+
 /* Over a convex target one point's distance may be enough: the target lies behind the plane through the point
  * closest to a place outside, so that no point of the element is nearer than its lowest corner's height over
  * that plane. Where that is the place's own distance the place is the deepest; where it is outside nobody
@@ -204,8 +216,11 @@ static bool measure_convex(const morph_blanket_state *b, const element *e, const
     double q[3];
     if (!b->convex || !memo->known) return false;
     const double enough = e->radius - 0.5 * MORPH_BLANKET_CLEARANCE_HELD * spacing;
-    if (clear_of_plane(b, e, v, enough, memo)) return true;
-    now.vertex = memo->vertex;
+    if (clear_of_plane(b, e, v, enough, &now)) {
+        if (!felt(b, e, v, &now)) return false;
+        *memo = now;
+        return true;
+    }
     morph_blanket_place(v[0], corner, e->corners, memo->weight, q);
     morph_distance_point(b->exact, q, &at);
     if (!(at.distance > TIGHT * spacing)) return false;
@@ -217,6 +232,7 @@ static bool measure_convex(const morph_blanket_state *b, const element *e, const
     now.gap = height - e->radius;
     now.planar = true;
     now.fresh = !now.bounded;
+    if (now.bounded && !felt(b, e, v, &now)) return false;
     *memo = now;
     memcpy(memo->corner, v, sizeof memo->corner);
     return true;
@@ -230,14 +246,13 @@ static double moved_since(const morph_memo *memo, const double v[3][3], int corn
 }
 
 /* What moved has come nearer by no more than it moved. A convex target lies wholly behind the plane through
- * the point closest to anything outside, be it the deepest place or not: an element that slides along it
- * stays clear however far. */
+ * the closest point: an element that slides along it stays clear however far. */
 double morph_blanket_gap_bound(const morph_blanket_state *b, int n, const double v[3][3]) {
     const morph_memo *memo = &b->memo[n];
     const element e = element_of(b->structure, n);
     if (!memo->known) return -INFINITY;
     const double bound = memo->gap - moved_since(memo, v, e.corners);
-    if (!b->convex || !(memo->gap + e.radius > 0.0)) return bound;
+    if (!b->convex || (memo->bounded && !memo->planar) || !(memo->gap + e.radius > 0.0)) return bound;
     return fmax(bound, height_over(memo, v, e.corners) - e.radius);
 }
 
