@@ -8,13 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FINE = 12 }; /* points examined per interval */
-
 morph_path_options morph_path_defaults(void) {
     return (morph_path_options){.end = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
                                 .interior = {.length = 0.02, .angle = 0.03, .clearance = 0.06, .self = 0.02},
                                 .intervals = 12,
                                 .poses = 64,
+                                .fine = 12,
                                 .sweeps = 1,
                                 .smoothness = 30.0,
                                 .refine = true};
@@ -171,8 +170,8 @@ static morph_status examine_curve(pather *p, const morph_curve *curve, breach *b
         r->violation.amount[l] = -INFINITY;
     for (int k = 0; k + 1 < p->count && status == MORPH_OK; k++) {
         breaches[k] = (breach){.worst = -INFINITY, .s = p->s[k]};
-        for (int f = 0; f <= FINE && status == MORPH_OK; f++) {
-            const double s = p->s[k] + (p->s[k + 1] - p->s[k]) * f / FINE;
+        for (int f = 0; f <= p->options->fine && status == MORPH_OK; f++) {
+            const double s = p->s[k] + (p->s[k + 1] - p->s[k]) * f / p->options->fine;
             morph_violation v;
             morph_curve_joints(curve, s, 0, scratch, x);
             for (int i = 0; i < p->coordinates; i++)

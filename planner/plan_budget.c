@@ -12,18 +12,18 @@
  * for the best so far, and the second signal does not wait. */
 #define GRACE 3.0
 
-/* Shares of a budget, of the whole from its start, until there is a draft to tell what things take: the
- * blanket, the end moved inside its limits, the path, its timing. The rest is for check and writing. */
-#define SHARE_NOMINAL 0.3
-#define SHARE_PROJECT 0.45
-#define SHARE_PATH 0.65
-#define SHARE_TIMING 0.75
+/* Of the time that is left of a budget, what the stages may take until there is a draft to tell: the blanket,
+ * the end moved inside its limits, the path, its timing. */
+#define SHARE_NOMINAL 0.5
+#define SHARE_PROJECT 0.25
+#define SHARE_PATH 0.4
+#define SHARE_TIMING 0.3
 
 /* Of the time for a better plan, what centres of attraction may take: refining the end gains more. */
 #define SHARE_PLACEMENT 0.35
 
-/* The next path has more poses than the draft's, and its schedule may be longer. */
-#define PATH_AGAIN 1.5
+/* The next path may be the second way or have more poses than the draft's, and its schedule may be longer. */
+#define PATH_AGAIN 3.0
 #define TAIL_AGAIN 1.15
 
 /* Less than this of the budget is not worth beginning a better plan. */
@@ -88,20 +88,20 @@ morph_status morph_planner_survive(morph_planner *p, morph_status status, morph_
 
 /* With a draft its times tell; without, the shares. */
 static double budget_deadline(const morph_planner *p, morph_stage stage) {
-    const double budget = p->options->budget, end = p->started + budget;
     const morph_draft *d = &p->draft;
+    const double now = morph_seconds(), end = p->started + p->options->budget, left = fmax(0.0, end - now);
     const double timing = end - TAIL_AGAIN * d->tail_seconds, path = timing - PATH_AGAIN * d->path_seconds;
     switch (stage) {
     case MORPH_STAGE_NOMINAL:
-        return p->started + SHARE_NOMINAL * budget;
+        return now + SHARE_NOMINAL * left;
     case MORPH_STAGE_PLACEMENT:
-        return morph_seconds() + SHARE_PLACEMENT * (path - morph_seconds());
+        return now + SHARE_PLACEMENT * (path - now);
     case MORPH_STAGE_REFINE:
-        return d->there ? path : p->started + SHARE_PROJECT * budget;
+        return d->there ? path : now + SHARE_PROJECT * left;
     case MORPH_STAGE_PATH:
-        return d->there ? timing : p->started + SHARE_PATH * budget;
+        return d->there ? timing : now + SHARE_PATH * left;
     case MORPH_STAGE_TIMING:
-        return d->there ? end - 0.8 * d->tail_seconds : p->started + SHARE_TIMING * budget;
+        return d->there ? end - 0.8 * d->tail_seconds : now + SHARE_TIMING * left;
     case MORPH_STAGE_REPLAY:
         return end - morph_planner_write_seconds(&p->plan->record);
     case MORPH_STAGE_TARGET:
@@ -202,7 +202,7 @@ void morph_planner_choose(morph_planner *p, morph_status *status) {
     morph_summary *s = &p->plan->summary;
     if (!d->there) return;
     const bool lost = *status == MORPH_ERR_NOMEM || *status == MORPH_ERR_BACKEND;
-    if (*status != MORPH_OK && !(lost && d->summary.feasible)) return;
+    if (*status != MORPH_OK && !((lost || *status == MORPH_ERR_STOPPED) && d->summary.feasible)) return;
     if (lost) morph_planner_survive(p, *status, MORPH_STAGE_REFINE);
     const bool better = d->summary.feasible != s->feasible ? d->summary.feasible
                                                            : d->summary.plan.objective < s->plan.objective;
@@ -220,17 +220,19 @@ void morph_planner_choose(morph_planner *p, morph_status *status) {
 /* Rows of schedule.csv that a trial writes. */
 enum { TRIAL = 40 };
 
-/* Numbers become text in schedule.csv, and the record goes to the disk, once to be written and once to be
- * read for its checksum: 100 MB/s are a slow disk's. Pictures and tables of the report take the rest. */
+/* Numbers become text in schedule.csv, and the trial tells how long one takes here and now. The record goes
+ * to the disk and is read for its checksum, at 50 MB/s where others are at work too. The report's pictures
+ * take as long as so many numbers: 170 to 280 thousand from 4 x 4 to 8 x 8 nodes. */
 double morph_planner_write_seconds(const morph_record *record) {
+    const double pictures = 2.5e5;
     if (record->samples < 2 || !record->time) return 0.0;
     const double since = morph_seconds(), samples = record->samples;
     morph_record few = *record; /* borrows every array */
     few.samples = (int)fmin(TRIAL, samples);
     morph_text text;
     if (morph_schedule_csv(&few, &text) == MORPH_OK) morph_text_free(&text);
-    const double csv = (morph_seconds() - since) * samples / few.samples;
+    const double row = (morph_seconds() - since) / few.samples, number = row / (record->links + 1);
     const double bytes = 8.0 * (samples * (3.0 * record->joints + 3.0 * record->links) +
                                 record->nominal_frames * (3.0 * record->joints + record->links));
-    return 1.3 * csv + bytes / 1e8 + 0.1;
+    return row * samples + bytes / 5e7 + pictures * number + 0.05;
 }

@@ -36,7 +36,8 @@ static morph_status cut_tangle(morph_planner *p) {
 
 static morph_status refine(morph_planner *p, const morph_refine_options *o) {
     const double since = morph_seconds();
-    morph_status status = p->guided ? MORPH_OK : cut_tangle(p);
+    /* A draft only moves the end: frames before it are nothing to it. */
+    morph_status status = p->guided || morph_planner_drafts(p) ? MORPH_OK : cut_tangle(p);
     if (status == MORPH_OK) status = morph_refine(&p->work.world, o, p->end, &p->refined);
     const morph_refine_report r = p->refined;
     status = morph_planner_ended(p, status, MORPH_STAGE_REFINE);
@@ -78,6 +79,7 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
     morph_path_options o = morph_path_defaults();
     o.control = morph_planner_control(p);
     o.refine = solve;
+    if (!solve && p->options->method == MORPH_METHOD_IPOPT) o.fine = 2; /* only to choose what to trim */
     o.smooth = p->options->method == MORPH_METHOD_IPOPT;
     o.unfold = unfold;
     if (stations && p->refined.stations > 0) {
@@ -125,6 +127,10 @@ static morph_status trim_path(morph_planner *p) {
     p->deadline = INFINITY;
     const morph_status status = morph_planner_trim(p, p->curve, &piece, &kept);
     if (status != MORPH_OK || !piece) return status;
+    if (kept >= 1.0) { /* all of it holds as it is */
+        morph_curve_destroy(piece);
+        return MORPH_OK;
+    }
     morph_curve_destroy(p->curve);
     p->curve = piece;
     p->optimal = false;
@@ -163,8 +169,12 @@ morph_status morph_stage_path(morph_planner *p) {
         if (p->stopped || morph_planner_drafts(p) || morph_seconds() > p->deadline) break;
         k++;
     }
-    if (status == MORPH_OK && (!p->curve || (solve && cut && least > 1.0))) status = plain_path(p, &least);
-    if (status == MORPH_OK && solve && cut && least > 1.0) status = trim_path(p);
+    /* With a plan in hand nothing is patched up for want of time. */
+    if (status == MORPH_OK && !p->curve && !p->stopped && p->draft.there && p->draft.summary.feasible)
+        status = MORPH_ERR_STOPPED;
+    const bool plain = !p->curve || (solve && cut && least > 1.0 && !p->draft.there);
+    if (status == MORPH_OK && plain) status = plain_path(p, &least);
+    if (status == MORPH_OK && solve && cut && (plain || least > 1.0)) status = trim_path(p);
     morph_planner_time(p, MORPH_STAGE_PATH, since);
     return status;
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 /* The piece is drawn anew through so many of its poses, and examined at so many points. */
-enum { POSES = 24, POINTS = 8 * POSES };
+enum { POSES = 24, POINTS = 6 * POSES };
 
 /* A beginning as short as this is no motion. */
 static const double least_piece = 0.01;

@@ -277,8 +277,15 @@ static morph_status improve(refiner *r, int round, double *objective) {
         morph_nlp_result_free(&result);
         return status;
     }
-    status = morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
-                           &r->report->effort);
+    /* A solve that was cut short is not worth moving inside the limits: the best so far is. */
+    status = morph_stopped(r->options->control)
+                 ? MORPH_ERR_STOPPED
+                 : morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
+                                 &r->report->effort);
+    if (status == MORPH_ERR_STOPPED) {
+        morph_nlp_result_free(&result);
+        return status;
+    }
     bool through = false;
     *objective = INFINITY;
     if (status == MORPH_OK && r->best_feasible) status = passes_through(r, r->x, &through);

@@ -55,17 +55,13 @@ static void on_signal(int number) {
     signal(number, SIG_DFL);
 }
 
-static int ask_stop(void *user) {
-    (void)user;
-    return interrupted != 0;
-}
-
 typedef struct screen {
     bool terminal, quiet, verbose;
     double started;
     char stage[32];
     int percent;
-    bool bar; /* a bar stands on the line */
+    bool bar;  /* a bar stands on the line */
+    bool told; /* that it is stopping */
 } screen;
 
 static double now(void) {
@@ -82,6 +78,15 @@ static void clear_bar(screen *s) {
 static void on_message(void *user, const char *line) {
     clear_bar(user);
     fprintf(stderr, "%s\n", line);
+}
+
+/* What a second signal would do is said once, when the first is heard. */
+static int ask_stop(void *user) {
+    screen *s = user;
+    if (!interrupted) return 0;
+    if (!s->told && !s->quiet) on_message(s, "stopping with the best so far; a second time ends at once");
+    s->told = true;
+    return 1;
 }
 
 static void on_log(void *user, const char *line) {

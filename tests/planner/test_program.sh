@@ -127,6 +127,8 @@ refused plan "$scene" "$scene"
 refused plan "$work/missing.yaml"
 says missing.yaml
 refused plan "$scene" --budget -5
+refused plan "$scene" --budget 0
+refused plan "$scene" --budget soon
 refused plan "$scene" --level best
 refused plan "$scene" -o "$work/none/box.plan"
 says "$work/none"
@@ -183,8 +185,6 @@ later trade trade "$scene"
 run "$program" plan "$placed" --method nlopt -o "$work/nlopt.plan" --quiet
 holds "--method nlopt ends with 0 or 3, not $code" [ "$code" -eq 0 -o "$code" -eq 3 ]
 holds 'it says what guided it' grep -q '"guided"' "$work/nlopt.plan/summary.json"
-later export export "$plan" --format csv
-later '--budget' plan "$scene" --budget 5
 later '--level draft' plan "$scene" --level draft
 later '--level fine' plan "$scene" --level fine
 later '--threads' plan "$scene" --threads 2
