@@ -77,6 +77,10 @@ static void fill_equalities(morph_balance *b) {
     }
 }
 
+double morph_balance_unit(const morph_structure_def *structure, double gravity) {
+    return gravity > 0.0 ? structure->mass * gravity : structure->stiffness * structure->spacing;
+}
+
 morph_status morph_balance_create(const morph_world *world, const morph_balance_load *load, int centres,
                                   morph_balance **out) {
     *out = NULL;
@@ -85,7 +89,7 @@ morph_status morph_balance_create(const morph_world *world, const morph_balance_
     if (!b) return MORPH_ERR_NOMEM;
     *b = (morph_balance){.world = world, .centres = centres, .coordinates = 3 * s->joints};
     b->weight = load->gravity > 0.0 ? 1.0 : 0.0;
-    b->unit = load->gravity > 0.0 ? s->def.mass * load->gravity : s->def.stiffness * s->spacing;
+    b->unit = morph_balance_unit(&s->def, load->gravity);
     b->softening = load->softening > 0.0 ? load->softening / s->spacing : 1.0;
     b->energy = morph_alloc((size_t)(s->links + 2 * s->link_posts + s->link_links), sizeof *b->energy);
     b->equality = morph_alloc((size_t)(s->posts + s->panels), sizeof *b->equality);

@@ -18,6 +18,10 @@
 #include "model/element.h"
 #include "planner/pose.h"
 
+/* The unit of force, N: the weight of a joint, or without gravity its springs' stiffness times the spacing.
+ */
+double morph_balance_unit(const morph_structure_def *structure, double gravity);
+
 /* What the sheet is under. */
 typedef struct morph_balance_load {
     double gravity;   /* m/s2 */
@@ -38,7 +42,7 @@ morph_status morph_limits_copy(morph_limits *to, const morph_limits *from);
  * change. */
 typedef struct morph_balance {
     const morph_world *world;
-    double unit;      /* N: weight of a joint, or without gravity its springs' stiffness times the spacing */
+    double unit;      /* morph_balance_unit() */
     double weight;    /* of a joint, in units: 1 or 0 */
     double softening; /* spacings */
     double hold;      /* stiffness of springs from every joint to `anchor`, units per spacing */

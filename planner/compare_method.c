@@ -120,8 +120,7 @@ static morph_status run_seeds(morph_compare_shared *sh, morph_compare_row *row) 
     int count = 0;
     if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
     const morph_scene *s = sh->scene;
-    const double unit = s->motion.gravity > 0.0 ? s->structure.mass * s->motion.gravity
-                                                : s->structure.stiffness * s->structure.spacing;
+    const double unit = morph_balance_unit(&s->structure, s->motion.gravity);
     morph_status status = morph_seed_centres(&sh->work, end, unit, 1, seed, &count);
     if (status == MORPH_OK) status = morph_guided_run(&sh->work, s, NULL, seed, count, sh->control, &t, NULL);
     if (status == MORPH_OK && t.frames > 0)

@@ -2,14 +2,16 @@
 
 #include "planner/guide.h"
 #include "planner/placement_rounds.h"
+#include "planner/stiffness.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 morph_placement_options morph_placement_defaults(void) {
-    /* hold: a joint's friction at the default coefficient, about half its weight, is spent within a quarter
-     * of a spacing. epsilon: a limit a tenth of a spacing away carries a hundredth of a weight. */
+    /* hold: a joint's friction at the default coefficient, about half its weight, is spent within a twentieth
+     * of a spacing; softer springs (2) left rounds at saddles, and were slower. epsilon: a limit a tenth of a
+     * spacing away carries a hundredth of a weight. */
     return (morph_placement_options){.evaluations = 60,
                                      .cover_weight = MORPH_COVER_WEIGHT,
                                      .slide = 0.1,
@@ -19,6 +21,8 @@ morph_placement_options morph_placement_defaults(void) {
                                      .strongest = 60.0,
                                      .thrift = 1e-7,
                                      .hold = 10.0,
+                                     .last_hold = 100.0,
+                                     .last_reach = 0.1,
                                      .epsilon = 1e-3,
                                      .last_epsilon = 1e-7,
                                      .rounds = 8,
@@ -79,27 +83,21 @@ static morph_status run_seeds(placer *p) {
     return status;
 }
 
-#define MOST_HOLD 80.0
-
 /* A balance in which the blanket rests where it lies, under these centres. */
-static morph_status adopt(placer *p, const morph_attractor *centre, int centres, double epsilon,
+static morph_status adopt(placer *p, const morph_attractor *centre, int centres, double epsilon, double hold,
                           morph_balance **b, morph_rest *rest) {
     const morph_balance_load load = {p->scene->motion.gravity, 0.0};
     morph_attractor scaled[MORPH_MOST_CENTRES];
     *rest = (morph_rest){0};
     morph_status status = morph_balance_create(&p->w->world, &load, centres, b);
     if (status != MORPH_OK) return status;
-    (*b)->hold = p->options->hold;
+    (*b)->hold = hold;
     for (int m = 0; m < centres; m++)
         scaled[m] = morph_balance_scaled(*b, &centre[m]);
     status = morph_rest_adopt(*b, scaled, epsilon, p->scaled, &p->quiet, rest);
-    /* Where the blanket lies need not be a minimum of energy: friction holds it. The springs that stand for
-     * that are stiffened until it is one, or the program would leave it for anywhere. */
-    morph_balance_report report = {.stable = true};
-    for (; status == MORPH_OK; (*b)->hold *= 2.0) {
-        status = morph_balance_examine(*b, rest->z, &report);
-        if (status != MORPH_OK || report.stable || (*b)->hold >= MOST_HOLD) break;
-    }
+    /* Where there is no minimum the program would leave for anywhere; where no hold makes one it may try. */
+    bool definite;
+    if (status == MORPH_OK) status = morph_stiffness_raise_hold(*b, rest->z, &definite);
     p->out->largest_force = 0.0;
     for (size_t i = 0; i < width(p) && status == MORPH_OK; i++)
         p->out->largest_force = fmax(p->out->largest_force, fabs((*b)->force[i]));
@@ -182,7 +180,7 @@ static morph_status round_of(placer *p, const morph_attractor *centre, int centr
     double *z = NULL;
     trial t = {0};
     *gain = 0.0;
-    morph_status status = adopt(p, centre, centres, p->options->epsilon, &b, &rest);
+    morph_status status = adopt(p, centre, centres, p->options->epsilon, p->options->hold, &b, &rest);
     if (status == MORPH_OK)
         status = proposal_of(p->options)(p->w, b, p->options, p->reach, time_left(p), &rest, &z, &result);
     if (status == MORPH_OK) {
@@ -265,9 +263,11 @@ static morph_status conclude(placer *p) {
     morph_nlp_result result = {0};
     double *z = NULL;
     trial t = {0};
-    morph_status status = adopt(p, out->centre, out->centres, p->options->last_epsilon, &b, &rest);
+    morph_status status =
+        adopt(p, out->centre, out->centres, p->options->last_epsilon, p->options->last_hold, &b, &rest);
     if (status == MORPH_OK)
-        status = proposal_of(p->options)(p->w, b, p->options, 0.1, time_left(p), &rest, &z, &result);
+        status = proposal_of(p->options)(p->w, b, p->options, p->options->last_reach, time_left(p), &rest, &z,
+                                         &result);
     if (status == MORPH_OK) {
         morph_effort_add(&out->effort, &result);
         out->solved = result.outcome == MORPH_OPTIMAL;
@@ -317,8 +317,7 @@ morph_status morph_placement_run(const morph_workspace *w, const morph_scene *sc
                                  const morph_placement_options *options, morph_placement *out) {
     *out = (morph_placement){0};
     placer p = {.w = w, .scene = scene, .options = options, .out = out, .started = morph_seconds()};
-    p.unit = scene->motion.gravity > 0.0 ? scene->structure.mass * scene->motion.gravity
-                                         : scene->structure.stiffness * scene->structure.spacing;
+    p.unit = morph_balance_unit(&scene->structure, scene->motion.gravity);
     if (options->control) {
         p.quiet.stop = options->control->stop;
         p.quiet.user = options->control->user;

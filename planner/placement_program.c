@@ -1,5 +1,5 @@
 /* The nonlinear program of placement. */
-#include "planner/placement.h"
+#include "planner/cavity_objective.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -30,61 +30,31 @@ static void set_bounds(const morph_balance *b, double reach, double strongest, c
 }
 
 /* Multipliers of a start that has none: the barrier's own for bounds, nothing for rows. */
-static bool start_warm(const morph_balance *b, const double *z, const double *lower, const double *upper,
-                       int rows, double mu, morph_nlp_result *r) {
-    const int n = morph_balance_unknowns(b);
-    *r = (morph_nlp_result){.unknowns = n, .rows = rows};
-    r->x = morph_alloc((size_t)n, sizeof(double));
-    r->row_multiplier = morph_alloc((size_t)rows, sizeof(double));
-    r->lower_multiplier = morph_alloc((size_t)n, sizeof(double));
-    r->upper_multiplier = morph_alloc((size_t)n, sizeof(double));
-    if (!r->x || !r->row_multiplier || !r->lower_multiplier || !r->upper_multiplier) return false;
-    for (int i = 0; i < n; i++) {
-        r->x[i] = z[i];
+static morph_status start_warm(int n, const double *z, const double *lower, const double *upper, int rows,
+                               double mu, morph_nlp_result *r) {
+    const morph_status status = morph_nlp_result_create(z, n, rows, r);
+    for (int i = 0; i < n && status == MORPH_OK; i++) {
         if (isfinite(lower[i]) && lower[i] < upper[i])
             r->lower_multiplier[i] = mu / fmax(z[i] - lower[i], mu);
         if (isfinite(upper[i]) && lower[i] < upper[i])
             r->upper_multiplier[i] = mu / fmax(upper[i] - z[i], mu);
     }
-    return true;
+    return status;
 }
 
 /* What a program borrows while it is solved. */
 typedef struct program {
-    const morph_workspace *w;
     morph_balance *balance;
     const morph_placement_options *options;
-    int (*cover_joint)[3];
-    double (*cover_weight)[3];
-    double *lower, *upper, *zero;
-    int *strength;
-    morph_gap_term gap;
-    morph_cover_term cover;
-    morph_near_term thrift;
+    double *lower, *upper;
+    morph_cavity_objective objective;
+    morph_control quiet; /* the caller's without its log: the program's iterations are too many lines */
 } program;
 
 static void release(program *p) {
-    free(p->cover_joint);
-    free(p->cover_weight);
     free(p->lower);
     free(p->upper);
-    free(p->zero);
-    free(p->strength);
-}
-
-/* Closest points of the target on the skin, for the shape that the program starts from. */
-static morph_status look(program *p, const double *x) {
-    const size_t exposed = (size_t)p->w->cavity->exposed, n = (size_t)p->balance->coordinates;
-    p->cover_joint = morph_alloc(exposed, sizeof *p->cover_joint);
-    p->cover_weight = morph_alloc(exposed, sizeof *p->cover_weight);
-    double *metres = morph_alloc(n, sizeof *metres);
-    morph_status status = p->cover_joint && p->cover_weight && metres ? MORPH_OK : MORPH_ERR_NOMEM;
-    for (size_t i = 0; i < n && status == MORPH_OK; i++)
-        metres[i] = p->w->structure->spacing * x[i];
-    if (status == MORPH_OK)
-        status = morph_cavity_closest(p->w->cavity, metres, p->cover_joint, p->cover_weight, NULL);
-    free(metres);
-    return status;
+    morph_cavity_objective_free(&p->objective);
 }
 
 static int fill_blocks(program *p, int n, morph_block *blocks) {
@@ -101,15 +71,8 @@ static int fill_blocks(program *p, int n, morph_block *blocks) {
         /* lambda c = epsilon alone would let a step pass to the side where both are negative. */
         blocks[count++] = morph_block_limits(b, lo, hi);
     }
-    p->gap = (morph_gap_term){p->w->cavity, p->w->sdf, 0.1, 1.0, true};
-    p->cover = (morph_cover_term){
-        p->w->cavity, (const int(*)[3])p->cover_joint, (const double(*)[3])p->cover_weight, p->options->slide,
-        0.0,          p->options->cover_weight};
-    p->thrift = (morph_near_term){b->centres, p->zero, p->options->thrift};
-    blocks[count++] = morph_block_gap(&p->gap, NULL);
-    blocks[count++] = morph_block_cover(&p->cover, NULL);
-    blocks[count++] = morph_block_near(&p->thrift, p->strength);
-    return count;
+    morph_cavity_objective_blocks(&p->objective, &blocks[count]);
+    return count + MORPH_CAVITY_BLOCKS;
 }
 
 /* The start is a point of the barrier's path already: a barrier far above that would drive it away. */
@@ -118,7 +81,7 @@ static int fill_blocks(program *p, int n, morph_block *blocks) {
 static morph_status solve(program *p, double moves, double *z, morph_nlp_result *result) {
     morph_balance *b = p->balance;
     const int n = morph_balance_unknowns(b), rows = b->rows + 2 * b->limits.count + b->equalities;
-    morph_block blocks[7];
+    morph_block blocks[4 + MORPH_CAVITY_BLOCKS];
     morph_nlp *nlp = NULL;
     char message[256] = "";
     free(p->lower);
@@ -131,12 +94,13 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
     morph_status status =
         morph_nlp_create(n, z, p->lower, p->upper, blocks, count, message, sizeof message, &nlp);
     if (status != MORPH_OK) morph_log(p->options->control, "placement: %s", message);
-    if (status == MORPH_OK && !start_warm(b, z, p->lower, p->upper, rows, fmin(FIRST_MU, b->epsilon), result))
-        status = MORPH_ERR_NOMEM;
+    if (status == MORPH_OK)
+        status = start_warm(n, z, p->lower, p->upper, rows, fmin(FIRST_MU, b->epsilon), result);
     if (status == MORPH_OK) {
         morph_nlp_options o = morph_nlp_defaults();
-        /* The objective is of order 1: as in the refinement's later rounds. */
-        o.tolerance = fmin(1e-4, b->epsilon);
+        /* The objective is of order 1: as in the refinement's later rounds. What balance and complementarity
+         * are worth hangs on the rows' own tolerance. */
+        o.tolerance = 1e-4;
         o.violation_tolerance = fmin(1e-6, 0.1 * b->epsilon);
         o.adaptive_mu = false;
         o.warm = true;
@@ -144,17 +108,8 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
         /* A round that wants more goes on in the next; a harder contact starts from the end of a softer one.
          */
         o.max_iterations = b->epsilon < p->options->epsilon ? 40 : 60;
-        if (p->options->control) {
-            /* Its iterations are too many lines. */
-            static const morph_control none;
-            morph_control quiet = none;
-            quiet.stop = p->options->control->stop;
-            quiet.user = p->options->control->user;
-            o.control = &quiet;
-            status = morph_nlp_solve(nlp, NULL, &o, result);
-        } else {
-            status = morph_nlp_solve(nlp, NULL, &o, result);
-        }
+        o.control = &p->quiet;
+        status = morph_nlp_solve(nlp, NULL, &o, result);
     }
     if (status == MORPH_OK) memcpy(z, result->x, (size_t)n * sizeof *z);
     morph_nlp_destroy(nlp);
@@ -176,15 +131,16 @@ enum { PASSES = 3 }; /* of adding limits that a solve went through */
 morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
                                      const morph_placement_options *options, double moves,
                                      const morph_rest *rest, double **z, morph_nlp_result *result) {
-    program p = {.w = w, .balance = b, .options = options};
+    program p = {.balance = b, .options = options};
     int iterations = 0;
     *z = NULL;
     *result = (morph_nlp_result){0};
-    p.zero = morph_alloc((size_t)b->centres, sizeof *p.zero);
-    p.strength = morph_alloc((size_t)b->centres, sizeof *p.strength);
-    morph_status status = p.zero && p.strength ? look(&p, rest->z) : MORPH_ERR_NOMEM;
-    for (int m = 0; m < b->centres && status == MORPH_OK; m++)
-        p.strength[m] = morph_balance_strength(b) + m;
+    if (options->control) {
+        p.quiet.stop = options->control->stop;
+        p.quiet.user = options->control->user;
+    }
+    morph_status status = morph_cavity_objective_create(w, options, rest->z, b->centres,
+                                                        morph_balance_strength(b), &p.objective);
     const double epsilon = b->epsilon, soft = fmax(epsilon, options->epsilon);
     b->epsilon = soft;
     for (int added = 1, pass = 0; added > 0 && pass < PASSES && status == MORPH_OK; pass++) {

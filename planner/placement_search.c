@@ -1,5 +1,6 @@
 #include "planner/placement_search.h"
 
+#include "planner/cavity_objective.h"
 #include "planner/stiffness.h"
 
 #include <stdio.h>
@@ -11,18 +12,11 @@
 static const morph_nearness search_nearness = {.length = 0.2, .angle = 0.4, .clearance = 0.5, .self = 0.12};
 
 struct morph_rest_cavity {
-    const morph_workspace *w;
     morph_balance *b;
     morph_control quiet; /* the caller's without its log: the solver's own lines are too many */
-    morph_gap_term gap;
-    morph_cover_term cover;
-    morph_near_term thrift;
-    int (*cover_joint)[3];
-    double (*cover_weight)[3];
-    double *zero;      /* centres */
-    int *strength;     /* centres: numbers among the objective's unknowns, which are coordinates, strengths */
-    morph_nlp *nlp;    /* the objective alone */
-    double *y, *slope; /* the objective's unknowns, and its gradient by them */
+    morph_cavity_objective objective;
+    morph_nlp *nlp;       /* the objective alone */
+    double *y, *slope;    /* the objective's unknowns, and its gradient by them */
     double *rows, *sigma; /* rows, equalities */
     morph_rest best;
     double best_value, until;
@@ -31,41 +25,25 @@ struct morph_rest_cavity {
 };
 
 static bool allocate(morph_rest_cavity *c) {
-    const size_t n = (size_t)(c->b->coordinates + c->b->centres), exposed = (size_t)c->w->cavity->exposed,
-                 centres = (size_t)c->b->centres;
-    c->cover_joint = morph_alloc(exposed, sizeof *c->cover_joint);
-    c->cover_weight = morph_alloc(exposed, sizeof *c->cover_weight);
-    c->zero = morph_alloc(centres, sizeof *c->zero);
-    c->strength = morph_alloc(centres, sizeof *c->strength);
+    const size_t n = (size_t)(c->b->coordinates + c->b->centres);
     c->y = morph_alloc(n, sizeof *c->y);
     c->slope = morph_alloc(n, sizeof *c->slope);
     c->rows = morph_alloc((size_t)c->b->rows, sizeof *c->rows);
     c->sigma = morph_alloc((size_t)c->b->equalities, sizeof *c->sigma);
-    return c->cover_joint && c->cover_weight && c->zero && c->strength && c->y && c->slope && c->rows &&
-           c->sigma;
+    return c->y && c->slope && c->rows && c->sigma;
 }
 
-/* Closest points of the target on the skin at x (scaled); c->slope is scratch. */
-static morph_status look(morph_rest_cavity *c, const double *x) {
-    for (int i = 0; i < c->b->coordinates; i++)
-        c->slope[i] = c->w->structure->spacing * x[i];
-    return morph_cavity_closest(c->w->cavity, c->slope, c->cover_joint, c->cover_weight, NULL);
-}
-
-static morph_status build_objective(morph_rest_cavity *c, const morph_placement_options *o) {
+/* Its unknowns are the coordinates and then the strengths. */
+static morph_status build_objective(morph_rest_cavity *c, const morph_workspace *w,
+                                    const morph_placement_options *o) {
     const int n = c->b->coordinates, centres = c->b->centres;
     char message[256];
-    for (int m = 0; m < centres; m++)
-        c->strength[m] = n + m;
-    c->gap = (morph_gap_term){c->w->cavity, c->w->sdf, 0.1, 1.0, true};
-    c->cover = (morph_cover_term){
-        c->w->cavity,   (const int(*)[3])c->cover_joint, (const double(*)[3])c->cover_weight, o->slide, 0.0,
-        o->cover_weight};
-    c->thrift = (morph_near_term){centres, c->zero, o->thrift};
-    const morph_block blocks[3] = {morph_block_gap(&c->gap, NULL), morph_block_cover(&c->cover, NULL),
-                                   morph_block_near(&c->thrift, c->strength)};
-    const morph_status status =
-        morph_nlp_create(n + centres, c->y, NULL, NULL, blocks, 3, message, sizeof message, &c->nlp);
+    morph_block blocks[MORPH_CAVITY_BLOCKS];
+    morph_status status = morph_cavity_objective_create(w, o, c->y, centres, n, &c->objective);
+    if (status != MORPH_OK) return status;
+    morph_cavity_objective_blocks(&c->objective, blocks);
+    status = morph_nlp_create(n + centres, c->y, NULL, NULL, blocks, MORPH_CAVITY_BLOCKS, message,
+                              sizeof message, &c->nlp);
     if (status != MORPH_OK) morph_log(o->control, "placement: %s", message);
     return status;
 }
@@ -88,25 +66,6 @@ static void unknowns_of(const morph_balance *b, const double *z, double *p) {
         memcpy(&p[4 * m], &z[morph_balance_centre(b) + 3 * m], 3 * sizeof *p);
         p[4 * m + 3] = z[morph_balance_strength(b) + m];
     }
-}
-
-/* Springs as stiff as those with which a shape is adopted hold it in any case. */
-#define HOLD_MOST 100.0
-
-/* A blanket held by friction may lie where without it there is no minimum: the springs that stand for
- * friction are then stiffened until there is one, and once more, for shapes near it. */
-static morph_status stiffen(morph_balance *b, const morph_rest *rest) {
-    bool definite = false;
-    for (bool weak = false; !definite; weak = true) {
-        morph_stiffness *k;
-        const morph_status status = morph_stiffness_create(b, rest->z, &k, &definite);
-        morph_stiffness_destroy(k);
-        if (status != MORPH_OK) return status;
-        if (definite && !weak) return MORPH_OK;
-        if (!definite && b->hold >= HOLD_MOST) return MORPH_ERR_BACKEND;
-        b->hold = fmin(HOLD_MOST, fmax(1.0, 2.0 * b->hold));
-    }
-    return MORPH_OK;
 }
 
 /* Clearance of a limit that is not yet in force, spacings: what stands nearer and is not among the limits is
@@ -137,7 +96,7 @@ morph_status morph_rest_cavity_create(const morph_workspace *w, morph_balance *b
     *out = NULL;
     morph_rest_cavity *c = morph_alloc(1, sizeof *c);
     if (!c) return MORPH_ERR_NOMEM;
-    *c = (morph_rest_cavity){.w = w, .b = b, .best_value = INFINITY};
+    *c = (morph_rest_cavity){.b = b, .best_value = INFINITY};
     c->until = seconds > 0.0 ? morph_seconds() + seconds : INFINITY;
     if (options->control) {
         c->quiet.stop = options->control->stop;
@@ -145,12 +104,14 @@ morph_status morph_rest_cavity_create(const morph_workspace *w, morph_balance *b
     }
     double p[4 * MORPH_MOST_CENTRES];
     morph_attractor centre[MORPH_MOST_CENTRES];
-    morph_status status = allocate(c) ? look(c, rest->z) : MORPH_ERR_NOMEM;
+    morph_status status = allocate(c) ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
         memcpy(c->y, rest->z, (size_t)b->coordinates * sizeof *c->y);
-        status = build_objective(c, options);
+        status = build_objective(c, w, options);
     }
-    if (status == MORPH_OK) status = stiffen(b, rest);
+    bool definite = true;
+    if (status == MORPH_OK) status = morph_stiffness_raise_hold(b, rest->z, &definite);
+    if (status == MORPH_OK && !definite) status = MORPH_ERR_BACKEND;
     if (status == MORPH_OK) status = widen(b, rest->z, nearness ? nearness : &search_nearness);
     if (status == MORPH_OK) {
         unknowns_of(b, rest->z, p);
@@ -169,11 +130,8 @@ morph_status morph_rest_cavity_create(const morph_workspace *w, morph_balance *b
 
 void morph_rest_cavity_destroy(morph_rest_cavity *c) {
     if (!c) return;
-    free(c->cover_joint);
-    free(c->cover_weight);
-    free(c->zero);
-    free(c->strength);
     morph_nlp_destroy(c->nlp);
+    morph_cavity_objective_free(&c->objective);
     free(c->y);
     free(c->slope);
     free(c->rows);

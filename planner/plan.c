@@ -267,6 +267,7 @@ morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *
     /* One BLAS thread: sums then repeat bit for bit. */
     morph_blas_threads(1);
     morph_planner p = {.scene = scene, .options = options, .started = since};
+    p.way = &p.nominal;
     morph_planner_listen(&p);
     p.plan = calloc(1, sizeof *p.plan);
     if (!p.plan) return MORPH_ERR_NOMEM;
@@ -278,6 +279,7 @@ morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *
     morph_curve_destroy(p.curve);
     morph_refine_report_free(&p.refined);
     morph_trajectory_free(&p.nominal);
+    morph_trajectory_free(&p.attracted);
     morph_workspace_free(&p.work);
     free(p.end);
     struct rusage usage;

@@ -23,7 +23,9 @@ typedef struct morph_planner {
     const morph_plan_options *options;
     morph_plan *plan;
     morph_workspace work;
-    morph_trajectory nominal;
+    morph_trajectory nominal, attracted;
+    const morph_trajectory
+        *way;    /* of the two, the one whose end is refined and whose frames a path may follow */
     double *end; /* 3*joints: the shape to reach */
     morph_refine_report refined;
     morph_curve *curve;

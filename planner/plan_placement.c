@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* From here on the blanket is that one: a path that has to go along its frames goes along these. */
+/* From here on the blanket is that one. */
 static morph_status follow(morph_planner *p, const morph_trajectory *guided) {
     morph_trajectory copy = {.joints = guided->joints};
     const size_t frames = (size_t)guided->frames, width = 3 * (size_t)guided->joints;
@@ -20,8 +20,8 @@ static morph_status follow(morph_planner *p, const morph_trajectory *guided) {
     memcpy(copy.time, guided->time, frames * sizeof(double));
     memcpy(copy.x, guided->x, frames * width * sizeof(double));
     memcpy(p->end, &copy.x[(frames - 1) * width], width * sizeof *p->end);
-    morph_trajectory_free(&p->nominal);
-    p->nominal = copy;
+    p->attracted = copy;
+    p->way = &p->attracted;
     return MORPH_OK;
 }
 

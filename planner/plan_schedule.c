@@ -34,43 +34,79 @@ static morph_status cut_tangle(morph_planner *p) {
     return status;
 }
 
-static morph_status refine(morph_planner *p, const morph_refine_options *o) {
-    const double since = morph_seconds();
-    /* A draft only moves the end: frames before it are nothing to it. */
-    morph_status status = p->guided || morph_planner_drafts(p) ? MORPH_OK : cut_tangle(p);
-    if (status == MORPH_OK) status = morph_refine(&p->work.world, o, p->end, &p->refined);
-    const morph_refine_report r = p->refined;
+/* Refines p->end into *report; rounds 0 only moves it inside its limits. */
+static morph_status refine(morph_planner *p, int rounds, morph_refine_report *report) {
+    morph_refine_options o = morph_refine_defaults();
+    o.control = morph_planner_control(p);
+    if (rounds > 0) o.goal = p->scene->goal;
+    o.rounds = rounds;
+    morph_status status = morph_refine(&p->work.world, &o, p->end, report);
     status = morph_planner_ended(p, status, MORPH_STAGE_REFINE);
-    status = morph_planner_survive(p, r.deaths > 0 && status == MORPH_OK ? MORPH_ERR_BACKEND : status,
+    status = morph_planner_survive(p, report->deaths > 0 && status == MORPH_OK ? MORPH_ERR_BACKEND : status,
                                    MORPH_STAGE_REFINE);
     morph_summary *s = &p->plan->summary;
-    s->iterations_refine = r.effort.iterations;
-    s->unknowns_refine = r.effort.unknowns;
-    s->rows_refine_used = r.effort.rows;
-    s->rows_refine_possible = r.rows_possible;
-    s->linear_seconds += r.effort.linear_seconds;
-    s->callback_seconds += r.effort.callback_seconds;
-    p->optimal = r.last == MORPH_OPTIMAL && r.rounds > 0 && !p->lost && !p->late;
-    morph_planner_time(p, MORPH_STAGE_REFINE, since);
+    s->iterations_refine += report->effort.iterations;
+    s->linear_seconds += report->effort.linear_seconds;
+    s->callback_seconds += report->effort.callback_seconds;
     return status;
+}
+
+/* A goal that was missed from where attraction led may be in reach from where the pure blanket lay: the shape
+ * that misses it by less is kept. */
+static morph_status refine_nominal(morph_planner *p) {
+    const size_t width = 3 * (size_t)p->work.structure->joints;
+    double *end = morph_alloc(width, sizeof *end);
+    if (!end) return MORPH_ERR_NOMEM;
+    memcpy(end, p->end, width * sizeof *end);
+    memcpy(p->end, &p->nominal.x[(size_t)(p->nominal.frames - 1) * width], width * sizeof *p->end);
+    morph_log(morph_planner_control(p),
+              "refine: the goal is missed from the guided blanket's end: from the pure one's");
+    morph_refine_report other = {0};
+    morph_status status = cut_tangle(p);
+    if (status == MORPH_OK) status = refine(p, morph_refine_defaults().rounds, &other);
+    if (status == MORPH_OK && other.feasible && other.miss < p->refined.miss) {
+        const morph_refine_report worse = p->refined;
+        p->refined = other;
+        other = worse;
+        p->way = &p->nominal;
+    } else {
+        memcpy(p->end, end, width * sizeof *end);
+    }
+    morph_refine_report_free(&other);
+    free(end);
+    return status;
+}
+
+static void note_refined(morph_planner *p, double since) {
+    morph_summary *s = &p->plan->summary;
+    s->unknowns_refine = p->refined.effort.unknowns;
+    s->rows_refine_used = p->refined.effort.rows;
+    s->rows_refine_possible = p->refined.rows_possible;
+    p->optimal = p->refined.last == MORPH_OPTIMAL && p->refined.rounds > 0 && !p->lost && !p->late;
+    morph_planner_time(p, MORPH_STAGE_REFINE, since);
 }
 
 morph_status morph_stage_refine(morph_planner *p) {
     if (p->options->method != MORPH_METHOD_IPOPT) return MORPH_OK;
     if (p->stopped) return morph_stage_project(p);
-    morph_refine_options o = morph_refine_defaults();
+    const double since = morph_seconds();
+    const int rounds = morph_refine_defaults().rounds;
     morph_planner_limit(p, MORPH_STAGE_REFINE);
-    o.control = morph_planner_control(p);
-    o.goal = p->scene->goal;
-    return refine(p, &o);
+    morph_status status = p->guided ? MORPH_OK : cut_tangle(p);
+    if (status == MORPH_OK) status = refine(p, rounds, &p->refined);
+    if (status == MORPH_OK && p->guided && p->refined.miss > 0.0 && !p->stopped && !p->late)
+        status = refine_nominal(p);
+    note_refined(p, since);
+    return status;
 }
 
+/* The frames on the way are nothing to it: none are cut. */
 morph_status morph_stage_project(morph_planner *p) {
-    morph_refine_options o = morph_refine_defaults();
+    const double since = morph_seconds();
     morph_planner_limit(p, MORPH_STAGE_REFINE);
-    o.control = morph_planner_control(p);
-    o.rounds = 0;
-    return refine(p, &o);
+    const morph_status status = refine(p, 0, &p->refined);
+    note_refined(p, since);
+    return status;
 }
 
 /* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
@@ -91,7 +127,7 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
     morph_curve *curve = NULL;
     morph_path_report r;
     const morph_status status =
-        morph_path_plan(&p->work.world, &p->nominal, p->work.start, p->end, &o, &curve, &r);
+        morph_path_plan(&p->work.world, p->way, p->work.start, p->end, &o, &curve, &r);
     morph_summary *s = &p->plan->summary;
     s->iterations_path += r.effort.iterations;
     s->linear_seconds += r.effort.linear_seconds;

@@ -8,21 +8,15 @@ const morph_nearness morph_rest_missed = {.length = -1e-3, .angle = -2e-3, .clea
 
 /* On the path of the barrier every limit has lambda c = epsilon: near a shape at rest that is the start. tau
  * as from where x comes. */
-static bool start_warm(const morph_balance *b, double epsilon, const double *x, const double *tau,
-                       morph_nlp_result *r) {
-    const int n = b->coordinates, rows = b->equalities + b->limits.count;
-    *r = (morph_nlp_result){.unknowns = n, .rows = rows};
-    r->x = morph_alloc((size_t)n, sizeof(double));
-    r->row_multiplier = morph_alloc((size_t)rows, sizeof(double));
-    r->lower_multiplier = morph_alloc((size_t)n, sizeof(double));
-    r->upper_multiplier = morph_alloc((size_t)n, sizeof(double));
-    if (!r->x || !r->row_multiplier || !r->lower_multiplier || !r->upper_multiplier) return false;
-    memcpy(r->x, x, (size_t)n * sizeof *x);
-    for (int e = 0; e < b->equalities; e++)
+static morph_status start_warm(const morph_balance *b, double epsilon, const double *x, const double *tau,
+                               morph_nlp_result *r) {
+    const morph_status status =
+        morph_nlp_result_create(x, b->coordinates, b->equalities + b->limits.count, r);
+    for (int e = 0; e < b->equalities && status == MORPH_OK; e++)
         r->row_multiplier[e] = -tau[e];
-    for (int q = 0; q < b->limits.count; q++)
+    for (int q = 0; q < b->limits.count && status == MORPH_OK; q++)
         r->row_multiplier[b->equalities + q] = -epsilon / fmax(morph_balance_limit_at(b, q, x), 1e-3);
-    return true;
+    return status;
 }
 
 void morph_rest_free(morph_rest *rest) {
@@ -64,10 +58,8 @@ static morph_status solve_rest(morph_balance *b, morph_rest_energy *energy, doub
         o.max_iterations = 200;
         o.max_seconds = seconds;
         o.control = control;
-        if (tau && !start_warm(b, epsilon, x, tau, result))
-            status = MORPH_ERR_NOMEM;
-        else
-            status = morph_nlp_solve(nlp, x, &o, result);
+        if (tau) status = start_warm(b, epsilon, x, tau, result);
+        if (status == MORPH_OK) status = morph_nlp_solve(nlp, x, &o, result);
     }
     morph_nlp_destroy(nlp);
     free(lower);

@@ -207,6 +207,20 @@ morph_status morph_stiffness_create(const morph_balance *b, const double *z, mor
     return MORPH_OK;
 }
 
+#define MOST_HOLD 100.0
+
+morph_status morph_stiffness_raise_hold(morph_balance *b, const double *z, bool *definite) {
+    for (bool weak = false;; weak = true) {
+        morph_stiffness *k;
+        const morph_status status = morph_stiffness_create(b, z, &k, definite);
+        morph_stiffness_destroy(k);
+        if (status != MORPH_OK || (*definite && !weak)) return status;
+        if (b->hold >= MOST_HOLD) return MORPH_OK;
+        b->hold = fmin(MOST_HOLD, fmax(1.0, 2.0 * b->hold));
+        if (*definite) return MORPH_OK;
+    }
+}
+
 void morph_stiffness_destroy(morph_stiffness *k) {
     if (!k) return;
     free(k->equality);

@@ -20,6 +20,11 @@ typedef struct morph_stiffness morph_stiffness;
  * and the object cannot solve. Limits without clearance at z count as if it were 1e-12. */
 morph_status morph_stiffness_create(const morph_balance *b, const double *z, morph_stiffness **out,
                                     bool *definite);
+/* A blanket that friction holds may lie where without friction there is no minimum. Doubles the balance's
+ * hold, which stands for friction, until the shape at z is a strict minimum, and once more if it had to, for
+ * shapes near it. *definite: whether it is one now; the hold ends at 100 units per spacing, with which a
+ * shape is adopted (rest.h). */
+morph_status morph_stiffness_raise_hold(morph_balance *b, const double *z, bool *definite);
 void morph_stiffness_destroy(morph_stiffness *k); /* NULL allowed */
 
 /* f, u: rows of the balance; g (NULL: zero), sigma: equalities. u may be f, sigma may be g. *residual (may be

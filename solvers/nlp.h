@@ -113,6 +113,8 @@ typedef struct morph_nlp_result {
         *upper_multiplier; /* rows, unknowns, unknowns; of the last iterate */
     double seconds, linear_seconds, callback_seconds;
 } morph_nlp_result;
+/* A start for a warm solve: x (unknowns, copied), multipliers zero and for the caller to fill. */
+morph_status morph_nlp_result_create(const double *x, int unknowns, int rows, morph_nlp_result *out);
 void morph_nlp_result_free(morph_nlp_result *result);
 
 /* Solves from x0 (unknowns; NULL if warm; may be result->x), or warm from *result, which must be zeroed or an

@@ -38,6 +38,23 @@ morph_nlp_options morph_nlp_defaults(void) {
     };
 }
 
+morph_status morph_nlp_result_create(const double *x, int unknowns, int rows, morph_nlp_result *out) {
+    const size_t n = (size_t)unknowns;
+    morph_nlp_result r = {.unknowns = unknowns, .rows = rows, .worst_row = -1};
+    r.x = morph_alloc(n, sizeof(double));
+    r.row_multiplier = morph_alloc((size_t)rows, sizeof(double));
+    r.lower_multiplier = morph_alloc(n, sizeof(double));
+    r.upper_multiplier = morph_alloc(n, sizeof(double));
+    *out = (morph_nlp_result){0};
+    if (!r.x || !r.row_multiplier || !r.lower_multiplier || !r.upper_multiplier) {
+        morph_nlp_result_free(&r);
+        return MORPH_ERR_NOMEM;
+    }
+    memcpy(r.x, x, n * sizeof *x);
+    *out = r;
+    return MORPH_OK;
+}
+
 void morph_nlp_result_free(morph_nlp_result *result) {
     if (!result) return;
     free(result->x);

@@ -10,39 +10,9 @@
 
 #include <cmocka.h>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-extern void *__libc_malloc(size_t size);
-extern void *__libc_calloc(size_t count, size_t size);
-extern void __libc_free(void *memory);
+#include "tests/support/refused_memory.h"
 
-/* countdown < 0: allocations succeed; at 0 the next one fails. */
-static volatile long countdown = -1, live;
-
-static bool refuse(void) {
-    return countdown >= 0 && countdown-- == 0;
-}
-
-#define SHOWN __attribute__((visibility("default")))
-
-SHOWN void *malloc(size_t size) {
-    if (refuse()) return NULL;
-    void *memory = __libc_malloc(size);
-    live += memory != NULL;
-    return memory;
-}
-
-SHOWN void *calloc(size_t count, size_t size) {
-    if (refuse()) return NULL;
-    void *memory = __libc_calloc(count, size);
-    live += memory != NULL;
-    return memory;
-}
-
-SHOWN void free(void *memory) {
-    live -= memory != NULL;
-    __libc_free(memory);
-}
-
+#if CAN_REFUSE
 static void test_refused(void **state) {
     (void)state;
     morph_structure_def def = morph_structure_defaults(0.1);

@@ -1,16 +1,16 @@
 # Sourced by the script tests of the program: sh test_NAME.sh PROGRAM SOURCE_FOLDER. Gives a folder of its own to work in
 # (removed at the end), runs commands and keeps what they say.
 #   $program $source  the two arguments    $work  the folder    $scene  the 4 x 4 box, without centres of attraction
-#   $placed  the same with them
+#   $placed  a 3 x 3 one with them
 #   $work/out $work/err  what the last command printed    $slow  not empty where sanitizers make everything slower
 set -u
 program=$1
 source=$2
-placed=$source/examples/scenes/box_4.yaml
+work=$(mktemp -d)
+placed=$work/placed.yaml
 slow=${MORPH_SANITIZE:-}
 failures=0
 mounted=""
-work=$(mktemp -d)
 
 finish() {
     status=$?
@@ -25,7 +25,14 @@ finish() {
 trap finish EXIT
 # Placing centres takes longer than all the rest of so small a plan.
 scene=$work/box_4.yaml
-{ cat "$placed" && echo && echo 'attractors: none'; } >"$scene"
+{ cat "$source/examples/scenes/box_4.yaml" && echo && echo 'attractors: none'; } >"$scene"
+cat >"$placed" <<'SCENE'
+morphplan: 1
+structure: {nodes: [3, 3], spacing: 0.1, link: {stiffness: 20}}
+target: {shape: box, size: [0.10, 0.10, 0.06]}
+motion: {friction: 0.4, time: 1}
+schedule: {sample: 0.01}
+SCENE
 trap 'exit 1' INT TERM HUP
 
 # fault WHAT: counts a failure and shows the last command's output.

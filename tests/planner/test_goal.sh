@@ -7,7 +7,7 @@ if [ -n "$slow" ]; then
     exit 77
 fi
 
-# scene NAME TARGET GOAL [LINK [ANGLE]]
+# scene NAME TARGET GOAL [LINK [ANGLE [ATTRACTORS]]]
 scene() {
     {
         echo 'morphplan: 1'
@@ -16,6 +16,7 @@ scene() {
         echo 'motion: {friction: 0.4, time: 1}'
         echo 'schedule: {sample: 0.01}'
         if [ -n "$3" ]; then echo "goal: $3"; fi
+        echo "attractors: ${6:-none}"
     } >"$work/$1.yaml"
 }
 box='{shape: box, size: [0.10, 0.10, 0.06]}'
@@ -42,6 +43,17 @@ expect 0 "$program" check "$work/met.plan"
 holds 'check lists it' grep -Eq '^goal +holds ' "$work/out"
 expect 0 "$program" check "$work/free.plan"
 holds 'and not where there is none' grep -Eq '^goal +not in this plan' "$work/out"
+
+# With centres, what can be met from where the pure blanket lay is met too, wherever attraction leads.
+gap() { sed -n 's/^cavity .*mean gap [0-9.e-]* -> \([0-9.e-]*\) m, .*/\1/p' "$work/out"; }
+expect 0 "$program" plan "$work/free.yaml" -o "$work/free.plan" --overwrite --quiet
+from_blanket=$(gap)
+scene drawn "$box" '' '' '' auto
+plan 0 drawn
+from_guided=$(gap)
+wanted=$(awk -v a="$from_blanket" -v b="$from_guided" 'BEGIN { printf "%.6f", 1.02 * (a < b ? a : b) }')
+scene asked "$box" "{mean_gap: $wanted}" '' '' auto
+plan 0 asked
 
 # Lengths nearly fixed; the control is the scene above.
 scene short "$box" '{mean_gap: 0.004}' 'length: [0.095, 0.105]'

@@ -21,7 +21,8 @@ static const char small[] =
     "structure: {nodes: [3, 2], spacing: 0.1, link: {stiffness: 20}}\n"
     "target: {shape: box, size: [0.1, 0.05, 0.06]}\n"
     "motion: {friction: 0.4, time: 0.5}\n"
-    "schedule: {sample: 0.01}\n";
+    "schedule: {sample: 0.01}\n"
+    "attractors: none\n";
 
 static const char smaller[] =
     "morphplan: 1\n"
@@ -216,8 +217,8 @@ static void test_stopped(void **state) {
     write_text("stop.yaml", smaller, scene);
     in_folder("stop.plan", out);
     const morph_job plain = morph_job_defaults();
-    const char *const stages[4] = {NULL, "nominal", "path", "timing"};
-    for (int k = 0; k < 4; k++) {
+    const char *const stages[] = {NULL, "nominal", "placement", "path", "timing"};
+    for (size_t k = 0; k < sizeof stages / sizeof *stages; k++) {
         listener l = {.until = stages[k]};
         morph_job job = morph_job_defaults();
         job.folder = out;

@@ -8,50 +8,11 @@
 #include "planner/timing.h"
 #include "test_pose_fixture.h"
 
-#include <errno.h>
 #include <limits.h>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-#define WRAPPED 1
-#define SHOWN __attribute__((visibility("default")))
-extern void *__libc_malloc(size_t size);
-extern void *__libc_calloc(size_t count, size_t size);
-extern void *__libc_realloc(void *old, size_t size);
-extern void __libc_free(void *memory);
+#include "tests/support/refused_memory.h"
 
-/* Counts down to the allocation that fails; below 0: none does. Volatile: compilers take it that an allocator
- * touches no variable of the program. */
-static volatile long countdown = -1, live;
-
-static bool refuse(void) {
-    if (countdown < 0 || countdown-- > 0) return false;
-    errno = ENOMEM;
-    return true;
-}
-
-SHOWN void *malloc(size_t size) {
-    void *memory = refuse() ? NULL : __libc_malloc(size);
-    live += memory != NULL;
-    return memory;
-}
-
-SHOWN void *calloc(size_t count, size_t size) {
-    void *memory = refuse() ? NULL : __libc_calloc(count, size);
-    live += memory != NULL;
-    return memory;
-}
-
-SHOWN void *realloc(void *old, size_t size) {
-    void *memory = refuse() ? NULL : __libc_realloc(old, size);
-    live += old == NULL && memory != NULL;
-    return memory;
-}
-
-SHOWN void free(void *memory) {
-    live -= memory != NULL;
-    __libc_free(memory);
-}
-
+#if CAN_REFUSE
 static fixture world;
 static morph_mesh mesh;
 static morph_curve *curve;
@@ -188,7 +149,7 @@ static void fail_in_turn(const char *what, morph_status (*job)(void), long step,
         const long before = live;
         countdown = at;
         const morph_status status = job();
-        const bool reached = countdown < 0;
+        const bool reached = was_refused();
         countdown = -1;
         if (live != before) fail_msg("%s: %ld blocks left after failure %ld", what, live - before, at);
         if (!reached) {
@@ -252,7 +213,7 @@ static void test_planner(void **state) {
 }
 #endif
 
-#if WRAPPED
+#if CAN_REFUSE
 int main(void) {
     prepare();
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_model), cmocka_unit_test(test_planner)};

@@ -17,7 +17,7 @@
 #include <cmocka.h>
 
 #define SHEET "morphplan: 1\nstructure: {nodes: [3, 3], spacing: 0.1, link: {stiffness: 20}}\n"
-#define REST "motion: {friction: 0.4, time: 0.6}\nschedule: {sample: 0.01}\n"
+#define REST "motion: {friction: 0.4, time: 0.6}\nschedule: {sample: 0.01}\nattractors: none\n"
 
 static char folder[64];
 
@@ -158,7 +158,7 @@ static void test_ball(void **state) {
     scene = scene_of(
         "morphplan: 1\nstructure: {nodes: [2, 2], spacing: 0.1, link: {stiffness: 20}}\n"
         "target: {shape: box, size: [0.05, 0.05, 0.04]}\n"
-        "motion: {time: 0.3}\nschedule: {sample: 0.01}\n");
+        "motion: {time: 0.3}\nschedule: {sample: 0.01}\nattractors: none\n");
     plan = run(scene);
     assert_false(plan->summary.deformable.used);
     assert_null(plan->record.deformed_v);
@@ -174,7 +174,8 @@ static void test_rise(void **state) {
         "morphplan: 1\n"
         "structure: {nodes: [4, 4], spacing: 0.1, fixed: corners, support: frame, link: {stiffness: 20}}\n"
         "target: {shape: sphere, radius: 0.09, at: [0, 0, -0.05], deformable: {young: 2.0e4, density: 300}}\n"
-        "motion: {mode: rise, height: 0.06, friction: 0.4, time: 1.0}\nschedule: {sample: 0.01}\n");
+        "motion: {mode: rise, height: 0.06, friction: 0.4, time: 1.0}\nschedule: {sample: 0.01}\nattractors: "
+        "none\n");
     morph_plan *plan = run(scene);
     assert_pressed(plan);
     assert_true(plan->record.offset_nominal[2] == -0.06);
@@ -222,7 +223,7 @@ static void test_pair(void **state) {
     const char *text =
         "morphplan: 1\nstructure: {nodes: [2, 2], spacing: 0.1, link: {stiffness: 20}}\n"
         "target: {shape: mesh, file: block.ele, scale: 0.08, deformable: {young: 2.0e4, density: 300}}\n"
-        "motion: {friction: 0.4, time: 0.3}\nschedule: {sample: 0.01}\n";
+        "motion: {friction: 0.4, time: 0.3}\nschedule: {sample: 0.01}\nattractors: none\n";
     morph_scene *scene = scene_of(text), *again = NULL;
     morph_plan *plan = run(scene);
     char message[256] = "";

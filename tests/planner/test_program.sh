@@ -192,9 +192,9 @@ later '--threads' plan "$scene" --threads 2
 # with SECTION KEY VALUE: the scene with a key more; SECTION "" is the top.
 with_key() {
     if [ -n "$1" ]; then
-        sed "s|^\( *\)$1:\$|&\n\1  $2: $3|" "$placed" >"$work/later.yaml"
+        sed "s|^\( *\)$1:\$|&\n\1  $2: $3|" "$source/examples/scenes/box_4.yaml" >"$work/later.yaml"
     else
-        { cat "$placed" && echo && echo "$2: $3"; } >"$work/later.yaml"
+        { cat "$source/examples/scenes/box_4.yaml" && echo && echo "$2: $3"; } >"$work/later.yaml"
     fi
 }
 later_key() {

@@ -11,62 +11,9 @@
 
 #include <cmocka.h>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-#define WRAPPED 1
-#else
-#define WRAPPED 0
-#endif
+#include "tests/support/refused_memory.h"
 
-#if WRAPPED
-extern void *__libc_malloc(size_t size);
-extern void *__libc_calloc(size_t count, size_t size);
-extern void *__libc_realloc(void *old, size_t size);
-extern void __libc_free(void *memory);
-
-/* countdown < 0: allocations succeed; at 0 the next one fails, and so do all after it if `dry`. Volatile,
- * since compilers take it that an allocator touches no variable of the program. */
-static volatile long countdown = -1, live;
-static volatile bool dry;
-
-static bool refuse(void) {
-    if (countdown < 0) return false;
-    if (countdown > 0) {
-        countdown--;
-        return false;
-    }
-    if (!dry) countdown = -1;
-    return true;
-}
-
-/* Visible to the libraries as well, whatever the build's default. */
-#define SHOWN __attribute__((visibility("default")))
-
-SHOWN void *malloc(size_t size) {
-    if (refuse()) return NULL;
-    void *memory = __libc_malloc(size);
-    live += memory != NULL;
-    return memory;
-}
-
-SHOWN void *calloc(size_t count, size_t size) {
-    if (refuse()) return NULL;
-    void *memory = __libc_calloc(count, size);
-    live += memory != NULL;
-    return memory;
-}
-
-SHOWN void *realloc(void *old, size_t size) {
-    if (refuse()) return NULL;
-    void *memory = __libc_realloc(old, size);
-    live += old == NULL && memory != NULL;
-    return memory;
-}
-
-SHOWN void free(void *memory) {
-    live -= memory != NULL;
-    __libc_free(memory);
-}
-
+#if CAN_REFUSE
 static const char good[] =
     "morphplan: 1\ntitle: x\nstructure: {nodes: [4, 4], spacing: 0.1, fixed: [[0, 0], [3, 1]]}\n"
     "target: {shape: box, size: [0.15, 0.15, 0.1], at: [0, 3, 0.1]}\n"
@@ -91,7 +38,7 @@ static bool read_refused(const char *text, morph_status otherwise, long n) {
     countdown = n;
     const morph_status status =
         morph_scene_parse("dir/s.yaml", text, strlen(text), count_line, count_line, &lines, &scene);
-    const bool reached = dry ? countdown == 0 : countdown < 0;
+    const bool reached = was_refused();
     countdown = -1;
     if (status == MORPH_OK) {
         assert_non_null(scene);
@@ -132,7 +79,7 @@ static void test_write(void **state) {
         char *text;
         countdown = n;
         const morph_status status = morph_scene_to_yaml(scene, NULL, &text);
-        const bool reached = countdown < 0;
+        const bool reached = was_refused();
         countdown = -1;
         if (!reached) {
             assert_int_equal(status, MORPH_OK);

@@ -9,51 +9,8 @@
 #include <stdlib.h>
 
 #include <cmocka.h>
-#include <errno.h>
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-#define CAN_WRAP 1
-/* Seen by the shared libraries too, whatever the visibility preset. */
-#define EXPORTED __attribute__((visibility("default")))
-void *__libc_malloc(size_t size);
-void *__libc_calloc(size_t n, size_t size);
-void *__libc_realloc(void *p, size_t size);
-void __libc_free(void *p);
-
-static long allocations, alive, fail_at; /* fail_at: the so-many-th allocation fails; 0: none */
-
-static bool refuse(void) {
-    if (++allocations != fail_at) return false;
-    errno = ENOMEM;
-    return true;
-}
-
-EXPORTED void *malloc(size_t size) {
-    if (refuse()) return NULL;
-    alive++;
-    return __libc_malloc(size);
-}
-
-EXPORTED void *calloc(size_t n, size_t size) {
-    if (refuse()) return NULL;
-    alive++;
-    return __libc_calloc(n, size);
-}
-
-EXPORTED void *realloc(void *p, size_t size) {
-    if (refuse()) return NULL;
-    if (!p) alive++;
-    return __libc_realloc(p, size);
-}
-
-EXPORTED void free(void *p) {
-    if (p) alive--;
-    __libc_free(p);
-}
-#else
-#define CAN_WRAP 0
-static long allocations, alive, fail_at;
-#endif
+#include "tests/support/refused_memory.h"
 
 static chain c;
 static morph_block blocks[2];
@@ -64,7 +21,7 @@ static morph_status create(morph_nlp **nlp) {
 
 static void callbacks_do_not_allocate(void **state) {
     (void)state;
-    if (!CAN_WRAP) skip();
+    if (!CAN_REFUSE) skip();
     morph_nlp *nlp;
     assert_int_equal(create(&nlp), MORPH_OK);
     double x[42], multiplier[20], values[500];
@@ -86,18 +43,18 @@ static void callbacks_do_not_allocate(void **state) {
 
 static void every_failing_allocation_in_create(void **state) {
     (void)state;
-    if (!CAN_WRAP) skip();
+    if (!CAN_REFUSE) skip();
     int failures = 0;
     for (long k = 1;; k++) {
-        const long before = alive;
+        const long before = live;
         morph_nlp *nlp = NULL;
-        fail_at = allocations + k;
+        countdown = k - 1;
         const morph_status status = create(&nlp);
-        const bool reached = allocations >= fail_at;
-        fail_at = 0;
+        const bool reached = was_refused();
+        countdown = -1;
         if (status != MORPH_OK) assert_null(nlp);
         morph_nlp_destroy(nlp);
-        assert_int_equal(alive, before);
+        assert_int_equal(live, before);
         if (!reached) {
             assert_int_equal(status, MORPH_OK);
             break;
@@ -110,16 +67,16 @@ static void every_failing_allocation_in_create(void **state) {
 
 static void every_failing_allocation_in_the_checker(void **state) {
     (void)state;
-    if (!CAN_WRAP) skip();
+    if (!CAN_REFUSE) skip();
     int failures = 0;
     for (long k = 1;; k++) {
-        const long before = alive;
+        const long before = live;
         morph_derivative_check out;
-        fail_at = allocations + k;
+        countdown = k - 1;
         const morph_status status = morph_check_derivatives(blocks, 2, c.x0, 42, 1e-5, 1e-7, &out);
-        const bool reached = allocations >= fail_at;
-        fail_at = 0;
-        assert_int_equal(alive, before);
+        const bool reached = was_refused();
+        countdown = -1;
+        assert_int_equal(live, before);
         if (!reached) break;
         assert_int_equal(status, MORPH_ERR_NOMEM);
         assert_false(out.passed);
@@ -132,23 +89,23 @@ static void every_failing_allocation_in_the_checker(void **state) {
  * a child process each is a status. Every allocation up to the 30th, then ever sparser. */
 static void failing_allocations_in_the_solver(void **state) {
     (void)state;
-    if (!CAN_WRAP) skip();
+    if (!CAN_REFUSE) skip();
     morph_nlp *nlp;
     assert_int_equal(create(&nlp), MORPH_OK);
     morph_nlp_options o = morph_nlp_defaults();
     o.isolated = true;
     int seen[MORPH_ERR_INTERNAL + 1] = {0};
     for (long k = 1; k < 40000; k += 1 + (k > 30 ? k / 8 : 0)) {
-        const long before = alive;
+        const long before = live;
         morph_nlp_result r = {0};
-        fail_at = allocations + k;
+        countdown = k - 1;
         const morph_status status = morph_nlp_solve(nlp, c.x0, &o, &r);
-        fail_at = 0;
+        countdown = -1;
         seen[status]++;
         if (status != MORPH_OK) assert_null(r.x);
         assert_true(status == MORPH_OK || status == MORPH_ERR_NOMEM || status == MORPH_ERR_BACKEND);
         morph_nlp_result_free(&r);
-        assert_int_equal(alive, before);
+        assert_int_equal(live, before);
     }
     print_message("%d solved, %d out of memory, %d ended otherwise\n", seen[MORPH_OK], seen[MORPH_ERR_NOMEM],
                   seen[MORPH_ERR_BACKEND]);
