@@ -23,7 +23,7 @@
 #define SHARE_PLACEMENT 0.35
 
 /* The next path may be the second way or have more poses than the draft's, and its schedule may be longer. */
-#define PATH_AGAIN 3.0
+#define PATH_AGAIN 1.5
 #define TAIL_AGAIN 1.15
 
 /* Less than this of the budget is not worth beginning a better plan. */

@@ -68,7 +68,7 @@ sound
 
 # Memory: from more than enough down to what the program itself cannot live with. Nothing else than these ends is allowed.
 ends=""
-for megabytes in 2000 400 360 340 320 300 280 260 240 200; do
+for megabytes in 2000 320 290 260 220; do
     rm -rf box.plan
     code=0
     (ulimit -v $((megabytes * 1024)) && exec "$program" plan "$scene" -o box.plan --quiet) >"$work/out" 2>"$work/err" || code=$?
