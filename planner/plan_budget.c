@@ -24,6 +24,8 @@
 
 /* The next path may be the second way or have more poses than the draft's, and its schedule may be longer. */
 #define PATH_AGAIN 1.5
+/* What a path gets at least of the time after the draft: a refined end without one is worth nothing. */
+#define PATH_LEAST 0.3
 #define TAIL_AGAIN 1.15
 
 /* Less than this of the budget is not worth beginning a better plan. */
@@ -90,7 +92,8 @@ morph_status morph_planner_survive(morph_planner *p, morph_status status, morph_
 static double budget_deadline(const morph_planner *p, morph_stage stage) {
     const morph_draft *d = &p->draft;
     const double now = morph_seconds(), end = p->started + p->options->budget, left = fmax(0.0, end - now);
-    const double timing = end - TAIL_AGAIN * d->tail_seconds, path = timing - PATH_AGAIN * d->path_seconds;
+    const double timing = end - TAIL_AGAIN * d->tail_seconds,
+                 path = timing - fmax(PATH_AGAIN * d->path_seconds, PATH_LEAST * (timing - d->made));
     switch (stage) {
     case MORPH_STAGE_NOMINAL:
         return now + SHARE_NOMINAL * left;
@@ -172,6 +175,7 @@ void morph_planner_keep_draft(morph_planner *p, double path_seconds, double tail
     p->draft.late = p->late;
     p->draft.path_seconds = path_seconds;
     p->draft.tail_seconds = tail_seconds;
+    p->draft.made = morph_seconds();
     p->draft.summary = *s;
     morph_planner_move_schedule(&p->plan->record, &p->draft.record);
     morph_curve_destroy(p->curve);

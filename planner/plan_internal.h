@@ -13,6 +13,7 @@ typedef struct morph_draft {
     bool there, optimal, late;
     morph_record record; /**< path/, timing/, schedule/ and mobility/ only; owned */
     morph_summary summary;
+    double made; /**< when: morph_seconds() */
     double path_seconds,
         tail_seconds; /**< what such a path takes, and all that follows it, writing included */
 } morph_draft;
