@@ -57,7 +57,7 @@ while [ "$k" -lt "$kills" ]; do
     if [ $((k % 2)) -eq 1 ]; then cp -r old.plan box.plan; fi
     # Golden steps between 0 and 1; half of them from the start to a little after the end, half about the writing.
     after=$(awk -v k="$k" -v all="$all" 'BEGIN { u = (k + 1) * 0.6180339887; u -= int(u);
-        print (int(k / 4) % 2 ? 0.6 + 0.7 * u : 1.2 * u) * all / 1000 }')
+        print (int(k / 4) % 2 ? 0.7 + 0.9 * u : 1.2 * u) * all / 1000 }')
     "$program" plan "$work/small.yaml" -o box.plan --overwrite --method "$method" --quiet >/dev/null 2>&1 &
     pid=$!
     sleep "$after"
