@@ -11,8 +11,9 @@
 morph_placement_options morph_placement_defaults(void) {
     /* hold: a joint's friction at the default coefficient, about half its weight, is spent within a twentieth
      * of a spacing; softer springs (2) left rounds at saddles, and were slower. epsilon: a limit a tenth of a
-     * spacing away carries a hundredth of a weight. */
-    /* last_reach: what springs say of friction holds while joints hardly move. */
+     * spacing away carries a hundredth of a weight.
+     * The last program's epsilon is below a millionth, as what is left counts as no force at a distance; its
+     * reach is what springs say true of friction for, and near enough to start with contacts that hard. */
     return (morph_placement_options){.evaluations = 60,
                                      .cover_weight = MORPH_COVER_WEIGHT,
                                      .slide = 0.1,
@@ -24,7 +25,9 @@ morph_placement_options morph_placement_defaults(void) {
                                      .hold = 10.0,
                                      .last_reach = 0.02,
                                      .epsilon = 1e-3,
-                                     .last_epsilon = 1e-7,
+                                     .last_epsilon = 5e-7,
+                                     .iterations = 60,
+                                     .last_iterations = 200,
                                      .rounds = 8,
                                      .most_centres = 3};
 }
@@ -84,14 +87,14 @@ static morph_status run_seeds(placer *p) {
 }
 
 /* A balance in which the blanket rests where it lies, under these centres. */
-static morph_status adopt(placer *p, const morph_attractor *centre, int centres, double epsilon, double hold,
+static morph_status adopt(placer *p, const morph_attractor *centre, int centres, double epsilon,
                           morph_balance **b, morph_rest *rest) {
     const morph_balance_load load = {p->scene->motion.gravity, 0.0};
     morph_attractor scaled[MORPH_MOST_CENTRES];
     *rest = (morph_rest){0};
     morph_status status = morph_balance_create(&p->w->world, &load, centres, b);
     if (status != MORPH_OK) return status;
-    (*b)->hold = hold;
+    (*b)->hold = p->options->hold;
     for (int m = 0; m < centres; m++)
         scaled[m] = morph_balance_scaled(*b, &centre[m]);
     status = morph_rest_adopt(*b, scaled, epsilon, p->scaled, &p->quiet, rest);
@@ -180,7 +183,7 @@ static morph_status round_of(placer *p, const morph_attractor *centre, int centr
     double *z = NULL;
     trial t = {0};
     *gain = 0.0;
-    morph_status status = adopt(p, centre, centres, p->options->epsilon, p->options->hold, &b, &rest);
+    morph_status status = adopt(p, centre, centres, p->options->epsilon, &b, &rest);
     if (status == MORPH_OK)
         status = proposal_of(p->options)(p->w, b, p->options, p->reach, time_left(p), &rest, &z, &result);
     if (status == MORPH_OK) {
@@ -263,11 +266,12 @@ static morph_status conclude(placer *p) {
     morph_nlp_result result = {0};
     double *z = NULL;
     trial t = {0};
-    morph_status status =
-        adopt(p, out->centre, out->centres, p->options->last_epsilon, p->options->hold, &b, &rest);
+    morph_placement_options o = *p->options;
+    o.epsilon = o.last_epsilon;
+    o.iterations = o.last_iterations;
+    morph_status status = adopt(p, out->centre, out->centres, o.epsilon, &b, &rest);
     if (status == MORPH_OK)
-        status = proposal_of(p->options)(p->w, b, p->options, p->options->last_reach, time_left(p), &rest, &z,
-                                         &result);
+        status = proposal_of(&o)(p->w, b, &o, o.last_reach, time_left(p), &rest, &z, &result);
     if (status == MORPH_OK) {
         morph_effort_add(&out->effort, &result);
         out->solved = result.outcome == MORPH_OPTIMAL;

@@ -32,6 +32,7 @@ typedef struct morph_placement_options {
     double last_reach;          /* and in the last solve, which is to say what the blanket does */
     double epsilon;             /* of complementarity in the rounds, unit times spacing */
     double last_epsilon;        /* and in the last solve */
+    int iterations, last_iterations; /* of one program at most */
     int rounds, most_centres;
     double seconds; /* wall, looked at between solves; <= 0: none */
     const morph_control *control;

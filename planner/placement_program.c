@@ -47,7 +47,6 @@ typedef struct program {
     morph_balance *balance;
     const morph_placement_options *options;
     double *lower, *upper;
-    double epsilon; /* of the last solve */
     morph_cavity_objective objective;
     morph_control quiet; /* the caller's without its log: the program's iterations are too many lines */
 } program;
@@ -106,11 +105,7 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
         o.adaptive_mu = false;
         o.warm = true;
         o.mu_init = fmin(FIRST_MU, b->epsilon);
-        /* A round that wants more goes on in the next; a harder contact starts from the end of a softer one.
-         */
-        o.max_iterations = b->epsilon >= p->options->epsilon ? 60
-                           : b->epsilon > 1.001 * p->epsilon ? 40
-                                                             : 120;
+        o.max_iterations = p->options->iterations;
         o.control = &p->quiet;
         status = morph_nlp_solve(nlp, NULL, &o, result);
     }
@@ -144,9 +139,6 @@ morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
     }
     morph_status status = morph_cavity_objective_create(w, options, rest->z, b->centres,
                                                         morph_balance_strength(b), &p.objective);
-    p.epsilon = b->epsilon;
-    const double epsilon = b->epsilon, soft = fmax(epsilon, options->epsilon);
-    b->epsilon = soft;
     for (int added = 1, pass = 0; added > 0 && pass < PASSES && status == MORPH_OK; pass++) {
         morph_nlp_result_free(result);
         free(*z);
@@ -157,14 +149,6 @@ morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
         status = morph_balance_more_limits(b, *z, &morph_rest_missed, &added);
         if (status == MORPH_OK && pass == PASSES - 1) b->limits.count -= added;
     }
-    /* From a soft contact to the one asked for, each solve from the end of the one before. */
-    while (status == MORPH_OK && b->epsilon > 1.001 * epsilon) {
-        b->epsilon = fmax(0.03 * b->epsilon, epsilon);
-        morph_nlp_result_free(result);
-        status = solve(&p, moves, *z, result);
-        iterations += result->iterations;
-    }
-    b->epsilon = epsilon;
     result->iterations = iterations;
     release(&p);
     if (status != MORPH_OK) {
