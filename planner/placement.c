@@ -23,11 +23,11 @@ morph_placement_options morph_placement_defaults(void) {
                                      .strongest = 60.0,
                                      .thrift = 1e-7,
                                      .hold = 10.0,
-                                     .last_reach = 0.02,
+                                     .last_reach = 0.01,
                                      .epsilon = 1e-3,
-                                     .last_epsilon = 5e-7,
+                                     .last_epsilon = 9e-7,
                                      .iterations = 60,
-                                     .last_iterations = 200,
+                                     .last_iterations = 300,
                                      .rounds = 8,
                                      .most_centres = 3};
 }
