@@ -30,7 +30,7 @@ enum morph_exit {
 typedef struct morph_job {
     const char *folder; /* plan folder; NULL: the scene's path without ending, + ".plan" */
     const char *method; /* "ipopt" (default) or "blanket" */
-    const char *motion; /* picture: "schedule" (default), "blanket", "replay", "core" */
+    const char *motion; /* picture: "schedule" (default), "blanket", "replay", "core", or "cavity" */
     bool overwrite;     /* exchange an existing plan folder; a stopped plan never does: it goes into
                            FOLDER.stopped */
     void (*message)(void *user, const char *line);                    /* faults and warnings, one line each */

@@ -19,7 +19,9 @@ static const char usage_text[] =
     "  picture DIR -o FILE.svg|png        still pictures: four moments, lengths over time\n"
     "          [--of MOTION]              of the schedule (default), the blanket, the replay of its "
     "lengths,\n"
-    "                                     or core: the replay with the target as a solid core\n"
+    "                                     core: the replay with the target as a solid core; or cavity: "
+    "the\n"
+    "                                     cavities under the blanket and under the plan\n"
     "  compare SCENE... [-o DIR]          blanket, plan and reference side by side: a table, and DIR "
     "(default: compare)\n"
     "                                     with compare.json and compare.html\n"
@@ -199,9 +201,9 @@ static int take_option(int option, const char *value, arguments *a) {
     case O_OF:
         a->motion = value;
         if (strcmp(value, "schedule") == 0 || strcmp(value, "blanket") == 0 || strcmp(value, "replay") == 0 ||
-            strcmp(value, "core") == 0)
+            strcmp(value, "core") == 0 || strcmp(value, "cavity") == 0)
             return 0;
-        return usage_fault("--of", value, "schedule, blanket, replay, core");
+        return usage_fault("--of", value, "schedule, blanket, replay, core, cavity");
     case O_SCHEDULE:
         a->schedule = value;
         return 0;
