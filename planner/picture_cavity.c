@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WIDTH = 1400, COLUMN = 656, MARGIN = 36, BETWEEN = 16, VIEW_TOP = 150, VIEW_HEIGHT = 420 };
+enum { WIDTH = 1200, COLUMN = 562, MARGIN = 30, BETWEEN = 16, VIEW_TOP = 140, VIEW_HEIGHT = 350 };
 enum { SCALE_TOP = VIEW_TOP + VIEW_HEIGHT + 44, CUTS_TOP = SCALE_TOP + 62, CUT_HEAD = 38, CUT_LEAST = 110 };
-enum { CUT_MOST = 420 };
+enum { CUT_MOST = 340 };
 
 /* One end of the two. */
 typedef struct side {
@@ -27,7 +27,7 @@ typedef struct page {
     morph_distance *target;
     morph_cavity *cavity;
     side side[2]; /* blanket, plan */
-    double most;  /* end of the colour scale, m */
+    morph_gap_scale tones;
     double lo[3], hi[3];
     double scale; /* of the cuts, points per m */
     double cut_height[2];
@@ -99,7 +99,7 @@ static morph_status find_place(page *p, double place[2]) {
 }
 
 static morph_status measure_sides(page *p) {
-    double place[2];
+    double place[2], most = 0;
     morph_status status = find_place(p, place);
     for (int k = 0; k < 2 && status == MORPH_OK; k++) {
         side *s = &p->side[k];
@@ -107,10 +107,10 @@ static morph_status measure_sides(page *p) {
         if (status == MORPH_OK) status = morph_gap_skin_create(p->cavity, s->x, &s->skin);
         for (int axis = 0; axis < 2 && status == MORPH_OK; axis++)
             status = morph_cavity_section_cut(p->cavity, s->x, axis, place[1 - axis], &s->cut[axis]);
-        if (status == MORPH_OK) p->most = fmax(p->most, s->skin.most);
+        if (status == MORPH_OK) most = fmax(most, s->skin.most);
     }
     /* A sheet without any gap still needs a scale. */
-    if (!(p->most > 0)) p->most = p->record->spacing;
+    p->tones = morph_gap_scale_to(most > 0 ? most : p->record->spacing);
     return status;
 }
 
@@ -205,14 +205,14 @@ static void heading(cairo_t *c, const page *p, int k) {
     const morph_measure *m = &p->side[k].measure, *before = &p->side[0].measure;
     const double left = column_left(k);
     char text[160], volume[32], gap[32];
-    morph_put_text(c, names[k], left, 100, 20, 0, true, morph_colour_text);
+    morph_put_text(c, names[k], left, 98, 19, 0, true, morph_colour_text);
     litres(m->volume, volume);
     morph_length_text(m->gap_mean, gap);
     int used = snprintf(text, sizeof text, "cavity %s", volume);
     if (k == 1) used += change(text + used, sizeof text - (size_t)used, m->volume, before->volume);
     used += snprintf(text + used, sizeof text - (size_t)used, ", mean gap %s", gap);
     if (k == 1) change(text + used, sizeof text - (size_t)used, m->gap_mean, before->gap_mean);
-    morph_put_text(c, text, left, 130, 20, 0, false, morph_colour_text);
+    morph_put_text(c, text, left, 125, 19, 0, false, morph_colour_text);
 }
 
 /* The same view and scale for both. */
@@ -239,24 +239,24 @@ static morph_status draw_views(cairo_t *c, const page *p) {
     morph_status status = morph_relief_create(r, &view, &relief);
     for (int k = 0; k < 2 && status == MORPH_OK; k++) {
         const side *s = &p->side[k];
-        const morph_gap_view what = {r, s->x, &s->skin, s->cut, p->most};
+        const morph_gap_view what = {r, s->x, &s->skin, s->cut, p->tones};
         cairo_save(c);
         cairo_translate(c, column_left(k), 0);
         frame_box(c, &box);
         cairo_rectangle(c, box.x, box.y, box.width, box.height);
         cairo_clip(c);
-        status = morph_draw_gap(c, &what, &view, &relief);
+        status = morph_draw_gap(c, &what, &view, &relief, &box);
         cairo_restore(c);
     }
     morph_relief_free(&relief);
     return status;
 }
 
-/* The largest length of 1, 2 or 5 times a power of ten that takes at most 110 points. */
+/* The largest length of 1, 2 or 5 times a power of ten that takes at most 60 points. */
 static void scale_bar(cairo_t *c, double scale, double right, double y) {
     char text[32];
-    double step = pow(10, floor(log10(110 / scale)));
-    step *= 5 * step * scale <= 110 ? 5 : 2 * step * scale <= 110 ? 2 : 1;
+    double step = pow(10, floor(log10(60 / scale)));
+    step *= 5 * step * scale <= 60 ? 5 : 2 * step * scale <= 60 ? 2 : 1;
     morph_length_text(step, text);
     morph_put_text(c, text, right, y, 14, 1, false, morph_colour_text);
     right -= morph_text_width(c, text, 14, false) + 8;
@@ -278,14 +278,14 @@ static void draw_cut(cairo_t *c, const page *p, int k, int axis, const morph_box
     /* Nearer to the origin than a hundredth of a spacing is there, for the eye. */
     const bool off = fabs(cut->at) > 0.01 * p->record->spacing;
     morph_length_text(off ? fabs(cut->at) : 0, at);
-    snprintf(text, sizeof text, "Cut %c, along %c at %c = %s%s:", axis ? 'B' : 'A', axis ? 'y' : 'x',
+    snprintf(text, sizeof text, "Cut %c along %c, %c = %s%s:", axis ? 'B' : 'A', axis ? 'y' : 'x',
              axis ? 'x' : 'y', off && cut->at < 0 ? "\xE2\x88\x92" : "", at);
     morph_put_text(c, text, box->x + 14, box->y + 25, 15, 0, false, morph_colour_text);
     const double after = box->x + 20 + morph_text_width(c, text, 15, false);
     if (cut->area < 1)
-        snprintf(text, sizeof text, "%.3g cm\xC2\xB2 of cavity", 1e4 * cut->area);
+        snprintf(text, sizeof text, "cavity %.3g cm\xC2\xB2", 1e4 * cut->area);
     else
-        snprintf(text, sizeof text, "%.3g m\xC2\xB2 of cavity", cut->area);
+        snprintf(text, sizeof text, "cavity %.3g m\xC2\xB2", cut->area);
     morph_put_text(c, text, after, box->y + 25, 15, 0, true, morph_colour_text);
     scale_bar(c, p->scale, box->x + box->width - 14, box->y + 25);
     const morph_cut_view what = {cut,
@@ -307,7 +307,7 @@ static morph_status draw_page(cairo_t *c, const void *data) {
         heading(c, p, k);
     const morph_status status = draw_views(c, p);
     const morph_box bar = {WIDTH / 2.0 - 300, SCALE_TOP, 600, 16};
-    morph_draw_gap_scale(c, p->most, &bar);
+    morph_draw_gap_scale(c, &p->tones, &bar);
     double top = CUTS_TOP;
     for (int axis = 0; axis < 2; axis++) {
         for (int k = 0; k < 2; k++) {

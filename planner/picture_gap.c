@@ -9,11 +9,19 @@
 
 const morph_colour morph_colour_cavity = {0.84, 0.37, 0.0};
 
+morph_gap_scale morph_gap_scale_to(double most) {
+    double first;
+    int count, digits;
+    const double step = morph_ticks(0, most, 14, &first, &count, &digits);
+    /* A largest gap that is a limit itself but for its rounding needs no tone more. */
+    return (morph_gap_scale){step, (int)fmin(fmax(ceil(most / step - 1e-9), 1), 1000)};
+}
+
 /* Relative luminance 0.83, 0.64, 0.21, 0.02: it falls all the way. */
-morph_colour morph_gap_colour(double share) {
+morph_colour morph_gap_colour(const morph_gap_scale *scale, int tone) {
     static const morph_colour stop[4] = {
         {0.90, 0.93, 0.96}, {0.99, 0.80, 0.47}, {0.84, 0.37, 0.0}, {0.33, 0.06, 0.02}};
-    const double s = 3 * fmin(fmax(share, 0), 1);
+    const double s = scale->tones > 1 ? fmin(fmax(3.0 * tone / (scale->tones - 1), 0), 3) : 0;
     const int k = s >= 2 ? 2 : (int)s;
     const double f = s - k;
     return (morph_colour){stop[k].r + f * (stop[k + 1].r - stop[k].r),
@@ -38,9 +46,9 @@ static double gap_at(const morph_cavity *c, const double p[3]) {
     return fmax(0, fmin(height, closest.distance) - radius);
 }
 
-/* More would not be seen, and would make a large file of an SVG. */
+/* More would not be seen. */
 #define MOST_PATCHES 5000.0
-enum { FINEST = 8 };
+enum { FINEST = 6 };
 
 /* Corner (a, b) of a triangle cut n times each way: steps along its two sides. */
 static void place(const double *const v[3], int n, int a, int b, double out[3]) {
@@ -62,10 +70,9 @@ static void cut_triangle(const morph_cavity *c, const double *const v[3], int n,
             for (int down = 0; down < (a + b + 1 < n ? 2 : 1); down++) {
                 const int i[3][2] = {{a + down, b + down}, {a + 1, b}, {a, b + 1}};
                 morph_gap_patch *patch = &out->patch[out->patches++];
-                patch->gap = 0;
                 for (int k = 0; k < 3; k++) {
                     place(v, n, i[k][0], i[k][1], patch->corner[k]);
-                    patch->gap += gap[i[k][0]][i[k][1]] / 3;
+                    patch->gap[k] = gap[i[k][0]][i[k][1]];
                 }
             }
 }
@@ -155,31 +162,54 @@ static int list_pieces(const gap_scene *s, piece *list) {
     for (int i = 0; i < r->links; i++)
         for (int part = 0; part < PARTS && r->link_kind[i] == MORPH_LINK_BOTTOM; part++) {
             line_ends(s, LINK, i, part, a, b);
-            list[n++] = (piece){0.5 * (a[2] + b[2]) + 0.1 * r->spacing, LINK, i, part};
+            list[n++] = (piece){0.5 * (a[2] + b[2]) + 0.17 * r->spacing, LINK, i, part};
         }
     for (int i = 0; i < cut[0].lines + cut[1].lines; i++)
         for (int part = 0; part < PARTS; part++) {
             line_ends(s, CUT, i, part, a, b);
-            list[n++] = (piece){0.5 * (a[2] + b[2]) + 0.15 * r->spacing, CUT, i, part};
+            list[n++] = (piece){0.5 * (a[2] + b[2]) + 0.22 * r->spacing, CUT, i, part};
         }
     return n;
 }
 
+/* The part of a patch where its gap is at least `least`: a triangle cut once. */
+static void path_above(cairo_t *c, double (*at)[3], const double gap[3], double least) {
+    cairo_new_path(c);
+    for (int k = 0; k < 3; k++) {
+        const int l = (k + 1) % 3;
+        if (gap[k] >= least) cairo_line_to(c, at[k][0], at[k][1]);
+        if ((gap[k] >= least) == (gap[l] >= least)) continue;
+        const double f = (least - gap[k]) / (gap[l] - gap[k]);
+        cairo_line_to(c, at[k][0] + f * (at[l][0] - at[k][0]), at[k][1] + f * (at[l][1] - at[k][1]));
+    }
+    cairo_close_path(c);
+}
+
+/* Tone upon tone, each with a rim, without antialiasing: else the seams would shine through. */
 static void draw_patch(const gap_scene *s, int index) {
     const morph_gap_patch *patch = &s->what->skin->patch[index];
-    double at[3];
-    patch_middle(s, index, at);
+    const morph_gap_scale *scale = &s->what->scale;
+    double at[3][3], middle[3];
+    patch_middle(s, index, middle);
     /* Skin lies on the target, and its triangles may dip in: hidden is only what is well behind. */
-    if (!morph_relief_shows(s->relief, s->view, NULL, at, 0.3 * s->what->record->spacing)) return;
+    if (!morph_relief_shows(s->relief, s->view, NULL, middle, 0.3 * s->what->record->spacing)) return;
+    double least = INFINITY, most = 0;
     for (int k = 0; k < 3; k++) {
-        morph_view_point(s->view, patch->corner[k], at);
-        cairo_line_to(s->c, at[0], at[1]);
+        morph_view_point(s->view, patch->corner[k], at[k]);
+        least = fmin(least, patch->gap[k]);
+        most = fmax(most, patch->gap[k]);
     }
-    cairo_close_path(s->c);
-    morph_set_colour(s->c, morph_gap_colour(patch->gap / s->what->most), 1);
-    cairo_fill_preserve(s->c);
-    cairo_set_line_width(s->c, 0.6); /* over the seam to the next one */
-    cairo_stroke(s->c);
+    const int from = (int)(least / scale->step), to = (int)(most / scale->step);
+    cairo_set_antialias(s->c, CAIRO_ANTIALIAS_NONE);
+    cairo_set_line_width(s->c, 0.6);
+    for (int tone = from; tone <= to && tone <= scale->tones; tone++) {
+        path_above(s->c, at, patch->gap, tone == from ? -1 : tone * scale->step);
+        morph_set_colour(s->c, morph_gap_colour(scale, tone), 1);
+        cairo_fill_preserve(s->c);
+        cairo_stroke(s->c);
+    }
+    cairo_new_path(s->c);
+    cairo_set_antialias(s->c, CAIRO_ANTIALIAS_DEFAULT);
 }
 
 static void draw_piece(const gap_scene *s, const piece *p) {
@@ -199,12 +229,30 @@ static void draw_piece(const gap_scene *s, const piece *p) {
         morph_set_colour(s->c, morph_colour_bottom, 1);
     } else {
         cairo_set_line_width(s->c, 0.9);
-        morph_set_colour(s->c, morph_colour_joint, 0.55);
+        cairo_set_source_rgb(s->c, 0.36, 0.38, 0.42);
     }
     cairo_stroke(s->c);
 }
 
-/* The letter of a cut at both ends of its line, a little beyond. */
+/* Is a point behind the target or behind the skin? */
+static bool hidden(const gap_scene *s, const double at[3]) {
+    if (!morph_relief_shows(s->relief, s->view, NULL, at, 0)) return true;
+    for (int i = 0; i < s->what->skin->patches; i++) {
+        double p[3][3], side[3];
+        for (int k = 0; k < 3; k++)
+            morph_view_point(s->view, s->what->skin->patch[i].corner[k], p[k]);
+        if (fmin(p[0][2], fmin(p[1][2], p[2][2])) < at[2]) continue;
+        for (int k = 0; k < 3; k++) {
+            const double *a = p[k], *b = p[(k + 1) % 3];
+            side[k] = (b[0] - a[0]) * (at[1] - a[1]) - (b[1] - a[1]) * (at[0] - a[0]);
+        }
+        if ((side[0] >= 0 && side[1] >= 0 && side[2] >= 0) || (side[0] <= 0 && side[1] <= 0 && side[2] <= 0))
+            return true;
+    }
+    return false;
+}
+
+/* The letter of a cut at both ends of its line, a little beyond, where that is seen. */
 static void draw_letters(const gap_scene *s, int which) {
     const morph_cavity_section *cut = &s->what->cut[which];
     const double *end[2] = {NULL, NULL};
@@ -219,7 +267,7 @@ static void draw_letters(const gap_scene *s, int which) {
         p[1 - cut->axis] = cut->at;
         p[2] = end[e][1];
         morph_view_point(s->view, p, at);
-        if (!morph_relief_shows(s->relief, s->view, NULL, at, 0)) continue;
+        if (hidden(s, at)) continue;
         cairo_new_path(s->c);
         cairo_arc(s->c, at[0], at[1], 10, 0, 2 * M_PI);
         morph_set_colour(s->c, morph_colour_bottom, 1);
@@ -247,56 +295,83 @@ static void draw_ground(const gap_scene *s) {
     cairo_stroke(s->c);
 }
 
-morph_status morph_draw_gap(cairo_t *c, const morph_gap_view *what, const morph_view *view,
-                            const morph_relief *relief) {
-    const gap_scene s = {c, what, view, relief};
-    const size_t most =
-        (size_t)what->skin->patches +
-        PARTS * ((size_t)what->record->links + (size_t)what->cut[0].lines + (size_t)what->cut[1].lines);
-    piece *list = morph_alloc(most, sizeof *list);
+static morph_status draw_skin(const gap_scene *s) {
+    const morph_gap_view *what = s->what;
+    const size_t lines =
+        (size_t)what->record->links + (size_t)what->cut[0].lines + (size_t)what->cut[1].lines;
+    piece *list = morph_alloc((size_t)what->skin->patches + PARTS * lines, sizeof *list);
     if (!list) return MORPH_ERR_NOMEM;
-    cairo_save(c);
-    cairo_set_line_cap(c, CAIRO_LINE_CAP_ROUND);
-    cairo_set_line_join(c, CAIRO_LINE_JOIN_ROUND);
-    draw_ground(&s);
-    morph_relief_paint(c, relief, view, NULL);
-    const int n = list_pieces(&s, list);
+    const int n = list_pieces(s, list);
     qsort(list, (size_t)n, sizeof *list, by_depth);
+    cairo_set_line_cap(s->c, CAIRO_LINE_CAP_ROUND);
+    cairo_set_line_join(s->c, CAIRO_LINE_JOIN_ROUND);
     for (int i = 0; i < n; i++)
-        draw_piece(&s, &list[i]);
-    for (int k = 0; k < 2; k++)
-        draw_letters(&s, k);
-    cairo_restore(c);
+        draw_piece(s, &list[i]);
     free(list);
     return MORPH_OK;
 }
 
-void morph_draw_gap_scale(cairo_t *c, double most, const morph_box *bar) {
-    enum { TONES = 60 };
-    for (int k = 0; k < TONES; k++) {
-        const double from = bar->x + bar->width * k / TONES, to = bar->x + bar->width * (k + 1) / TONES;
-        morph_set_colour(c, morph_gap_colour((k + 0.5) / TONES), 1);
-        cairo_rectangle(c, from, bar->y, fmin(to + 0.5, bar->x + bar->width) - from, bar->height);
-        cairo_fill(c);
-    }
+/* On paper of lines and curves the skin would be thousands of them: there it is an image, FINE samples a
+ * point. */
+static morph_status draw_skin_image(const gap_scene *s, const morph_box *box) {
+    enum { FINE = 2 };
+    cairo_surface_t *image = cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)ceil(FINE * box->width),
+                                                        (int)ceil(FINE * box->height));
+    cairo_t *c = cairo_create(image);
+    cairo_scale(c, FINE, FINE);
+    cairo_translate(c, -box->x, -box->y);
+    gap_scene inner = *s;
+    inner.c = c;
+    morph_status status = cairo_status(c) == CAIRO_STATUS_SUCCESS ? draw_skin(&inner) : MORPH_ERR_NOMEM;
+    cairo_destroy(c);
+    cairo_save(s->c);
+    cairo_translate(s->c, box->x, box->y);
+    cairo_scale(s->c, 1.0 / FINE, 1.0 / FINE);
+    cairo_set_source_surface(s->c, image, 0, 0);
+    cairo_paint(s->c);
+    cairo_restore(s->c);
+    cairo_surface_destroy(image);
+    return status;
+}
+
+morph_status morph_draw_gap(cairo_t *c, const morph_gap_view *what, const morph_view *view,
+                            const morph_relief *relief, const morph_box *box) {
+    const gap_scene s = {c, what, view, relief};
+    cairo_save(c);
+    draw_ground(&s);
+    morph_relief_paint(c, relief, view, NULL);
+    const bool image = cairo_surface_get_type(cairo_get_target(c)) == CAIRO_SURFACE_TYPE_IMAGE;
+    const morph_status status = image ? draw_skin(&s) : draw_skin_image(&s, box);
+    for (int k = 0; k < 2; k++)
+        draw_letters(&s, k);
+    cairo_restore(c);
+    return status;
+}
+
+void morph_draw_gap_scale(cairo_t *c, const morph_gap_scale *scale, const morph_box *bar) {
+    const double most = scale->step * scale->tones, unit = most < 1 ? 1e3 : 1;
+    const double wide = bar->width / scale->tones;
+    const int digits = (int)fmin(fmax(ceil(-log10(scale->step * unit) - 1e-9), 0), 9);
     cairo_set_line_width(c, 0.8);
-    morph_set_colour(c, morph_colour_faint, 1);
-    cairo_rectangle(c, bar->x, bar->y, bar->width, bar->height);
-    cairo_stroke(c);
-    const double unit = most < 1 ? 1e3 : 1;
-    double first;
-    int count, digits;
-    const double step = morph_ticks(0, most * unit, 6, &first, &count, &digits);
-    for (int k = 0; k < count; k++) {
-        const double x = bar->x + bar->width * fmin((first + k * step) / (most * unit), 1);
+    for (int k = 0; k <= scale->tones; k++) {
+        const double x = bar->x + k * wide;
         char text[48];
+        if (k < scale->tones) {
+            morph_set_colour(c, morph_gap_colour(scale, k), 1);
+            cairo_rectangle(c, x, bar->y, wide, bar->height);
+            cairo_fill(c);
+        }
+        if (k % 2 == 1 && scale->tones > 8) continue;
+        morph_set_colour(c, morph_colour_faint, 1);
         cairo_move_to(c, x, bar->y + bar->height);
         cairo_line_to(c, x, bar->y + bar->height + 5);
         cairo_stroke(c);
-        snprintf(text, sizeof text, "%.*f", digits, first + k * step);
+        snprintf(text, sizeof text, "%.*f", digits, k * scale->step * unit);
         morph_put_text(c, text, x, bar->y + bar->height + 19, 13, 0.5, false, morph_colour_text);
-        morph_set_colour(c, morph_colour_faint, 1);
     }
+    morph_set_colour(c, morph_colour_faint, 1);
+    cairo_rectangle(c, bar->x, bar->y, bar->width, bar->height);
+    cairo_stroke(c);
     morph_put_text(c,
                    unit > 1 ? "gap between sheet and target or base [mm]"
                             : "gap between sheet and target or base [m]",
