@@ -193,10 +193,11 @@ static void litres(double volume, char text[32]) {
         snprintf(text, 32, "%.3g m\xC2\xB3", volume);
 }
 
-/* " (-76 %)", nothing where there was nothing before. */
+/* " (-76 %)"; nothing where there was nothing before. */
 static int change(char *text, size_t size, double now, double before) {
     if (!(before > 0)) return 0;
     const double percent = 100 * (now / before - 1);
+    if (fabs(percent) < 0.5) return snprintf(text, size, " (as before)");
     return snprintf(text, size, " (%s%.0f %%)", percent < 0 ? "\xE2\x88\x92" : "+", fmin(fabs(percent), 1e6));
 }
 
