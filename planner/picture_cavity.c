@@ -84,7 +84,7 @@ static morph_status read_record(page *p) {
  * both cuts meet it twice. Without a cavity: through the middle of the target. */
 static morph_status find_place(page *p, double place[2]) {
     morph_cavity_parts parts;
-    const morph_status status = morph_cavity_parts_find(p->cavity, p->side[0].x, p->record->spacing / 16,
+    const morph_status status = morph_cavity_parts_find(p->cavity, p->side[0].x, p->record->spacing / 32,
                                                         morph_cavity_film(&p->structure), 0.0, &parts);
     if (status != MORPH_OK) return status;
     double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};

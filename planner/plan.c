@@ -48,8 +48,9 @@ morph_status morph_planner_cavities(const morph_planner *p, const double *x, dou
     double *seen = seen_from_target(p, x, lift);
     if (!seen) return MORPH_ERR_NOMEM;
     morph_cavity_parts parts;
-    const morph_status status = morph_cavity_parts_find(p->work.cavity, seen, st->spacing / 16,
-                                                        morph_cavity_film(st), MORPH_CAVITY_SHARE, &parts);
+    const morph_status status =
+        morph_cavity_parts_find(p->work.cavity, seen, st->spacing / MORPH_CAVITY_COLUMNS,
+                                morph_cavity_film(st), MORPH_CAVITY_SHARE, &parts);
     free(seen);
     if (status != MORPH_OK) return status;
     out->volume = parts.volume;

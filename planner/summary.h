@@ -33,13 +33,17 @@ typedef struct morph_placement_summary {
     char reason[160];
 } morph_placement_summary;
 
-/* The largest connected cavities of a pose, each with at least MORPH_CAVITY_SHARE of its cavity volume. */
-enum { MORPH_CAVITIES = 5 };
+/* The largest connected cavities of a pose, each with at least MORPH_CAVITY_SHARE of its cavity volume.
+ * Columns are finer than the measure's (a sixteenth of the spacing): ways from one cavity to the next down a
+ * steep wall are narrow. On plans of the suite 16 columns a spacing tore cavities apart that 32 and 64 show
+ * as one. */
+enum { MORPH_CAVITIES = 5, MORPH_CAVITY_COLUMNS = 32 };
 #define MORPH_CAVITY_SHARE 0.01
 typedef struct morph_cavity_list {
     int count;
     morph_cavity_part part[MORPH_CAVITIES];
-    double volume, film; /* of everything, and of the film where the sheet lies on the target, m3 */
+    double volume,
+        film; /* of everything by these columns, and of the film where the sheet lies on the target, m3 */
 } morph_cavity_list;
 
 typedef struct morph_summary {
