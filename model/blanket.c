@@ -216,7 +216,7 @@ static void resisting(const morph_blanket_state *b, morph_blanket_report *report
         report->held_element = l;
     }
     for (int t = 0; t < b->angles && most == 0.0; t++)
-        if (fmax(b->angle[t].push[0], b->angle[t].push[1]) > 0.0) {
+        if (fmax(b->turn[t].push[0], b->turn[t].push[1]) > 0.0) {
             report->held_by = MORPH_BLANKET_ANGLE;
             report->held_element = t;
         }
@@ -359,6 +359,8 @@ morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf
         status = MORPH_ERR_INPUT;
     else
         status = trajectory_create(out, (int)frames, structure->joints);
+    if (status == MORPH_OK && b->convex)
+        status = morph_blanket_hull_create(morph_distance_mesh(b->exact), &b->hull);
     if (status == MORPH_OK) status = run(b, (int)frames, control, out, &local);
     local.came_through = b->guard.through > 0;
     local.through_element = b->guard.through - 1;

@@ -32,7 +32,7 @@ static double excess(const double u[3], const double v[3], const range *r, doubl
     return over;
 }
 
-static void arms_of(const morph_angle *a, const double *x, double u[3], double v[3]) {
+static void arms_of(const morph_turn *a, const double *x, double u[3], double v[3]) {
     morph_sub(&x[3 * a->u[1]], &x[3 * a->u[0]], u);
     morph_sub(&x[3 * a->v[1]], &x[3 * a->v[0]], v);
 }
@@ -66,7 +66,7 @@ void morph_blanket_add_angles(morph_blanket_state *b) {
             r = range_at(s, t);
             cosines(&r, &lowest, &highest);
         }
-        arms_of(a, b->x, u, v);
+        arms_of(&b->turn[t], b->x, u, v);
         if (within(u, v, lowest, highest)) continue;
         const double pull = scale * excess(u, v, &r, grad);
         if (pull == 0.0) continue; /* also where grad was not set */
@@ -82,7 +82,7 @@ double morph_blanket_angle_energy(const morph_blanket_state *b) {
     for (int t = 0; t < b->angles && s->def.angle_stiffness > 0.0; t++) {
         const range r = range_at(s, t);
         double u[3], v[3];
-        arms_of(&b->angle[t], b->x, u, v);
+        arms_of(&b->turn[t], b->x, u, v);
         const double over = excess(u, v, &r, NULL);
         energy += 0.5 * s->def.angle_stiffness * over * over;
     }

@@ -5,8 +5,7 @@
 
 /* Contacts aim this much outside, as the other limits do (blanket_project.c). */
 #define CONTACT_MARGIN 1e-3 /* spacings */
-/* Places that no step brings closer than this, spacings, are not looked at; elements further away than it are
- * not by exact distances. */
+/* Joints that no step brings closer to the base plane than this, spacings, are not looked at. */
 #define NEAR 0.05
 /* The smooth distance has a slope near 1, less where edges are rounded; a flatter gradient than this is no
  * direction to trust with a full correction. */
@@ -15,7 +14,6 @@
 #define MOST_SLOPE 2.0
 /* Search for the deepest place: strides in barycentric weight. */
 #define LONGEST_STRIDE 0.25
-#define SHORTEST_STRIDE 0.01
 
 /* Following a place along its step: from which motion on and how near counts as there, in radii; strides grow
  * at least by SWEPT_CLOSE radii / MOST_SLOPE, and the last one counts as there. */
@@ -23,9 +21,6 @@
 #define SWEPT_CLOSE 0.05
 #define SWEPT_STRIDES 64
 
-/* A seeking place moves to where the exact distance is deepest if that is deeper by this, spacings: places at
- * rest stay where they are. */
-#define SEEK_GAIN 5e-3
 /* A place's distance is taken anew when it has moved further than this, spacings. */
 #define KEEP_PLANE 4e-3
 /* Nor than by this part of its radius: targets as thin as that turn their distance within it. */
@@ -92,16 +87,8 @@ morph_status morph_blanket_touches_create(morph_blanket_state *b) {
     return MORPH_OK;
 }
 
-static void place_of(const double *x, const int *joint, int corners, const double *weight, double q[3]) {
-    for (int k = 0; k < 3; k++) {
-        q[k] = 0.0;
-        for (int j = 0; j < corners; j++)
-            q[k] += weight[j] * x[3 * joint[j] + k];
-    }
-}
-
 /* A place as the target sees it: the target's lift taken off. */
-static double distance_at(const morph_blanket_state *b, const double q[3], double *g) {
+double morph_blanket_distance_at(const morph_blanket_state *b, const double q[3], double *g) {
     const double p[3] = {q[0], q[1], q[2] - b->lift_to};
     return morph_sdf_eval(b->sdf, p, g, NULL);
 }
@@ -130,14 +117,17 @@ static double distance_of(const morph_blanket_state *b, morph_touch *t, const do
 
 /* One round of a compass search in the weights: the place moves a stride towards the corner that brings it
  * deepest, or the stride shrinks. Kept from step to step, it follows the deepest place of the element. */
-static double seek(const morph_blanket_state *b, morph_touch *t, const double *x, double value) {
+static double seek(const morph_blanket_state *b, morph_touch *t, const double *x, const double at[3],
+                   double value) {
     double best[3], lowest = value;
     for (int j = 0; j < t->corners; j++) {
         double weight[3], q[3];
+        morph_sub(&x[3 * t->joint[j]], at, q);
+        if (morph_dot(t->gradient, q) > 0.0) continue; /* the distance grows that way */
         for (int k = 0; k < t->corners; k++)
             weight[k] = (1.0 - t->stride) * t->weight[k] + (k == j ? t->stride : 0.0);
-        place_of(x, t->joint, t->corners, weight, q);
-        const double here = distance_at(b, q, NULL);
+        morph_blanket_place(x, t->joint, t->corners, weight, q);
+        const double here = morph_blanket_distance_at(b, q, NULL);
         if (here < lowest) {
             lowest = here;
             memcpy(best, weight, sizeof best);
@@ -147,14 +137,14 @@ static double seek(const morph_blanket_state *b, morph_touch *t, const double *x
         memcpy(t->weight, best, sizeof best);
         t->stride = fmin(1.5 * t->stride, LONGEST_STRIDE);
     } else
-        t->stride = fmax(0.5 * t->stride, SHORTEST_STRIDE);
+        t->stride = fmax(0.5 * t->stride, MORPH_BLANKET_SHORTEST_STRIDE);
     return lowest;
 }
 
 /* Half space of the smooth distance about the contact's place: phi + g.(q - q0) >= radius, divided by |g|. */
 static bool set_plane(const morph_blanket_state *b, morph_contact *c, const double *x, double radius) {
     double q[3], g[3];
-    place_of(x, c->joint, c->corners, c->weight, q);
+    morph_blanket_place(x, c->joint, c->corners, c->weight, q);
     const double phi = distance_of(b, &b->touch[c->source], q, g);
     const double slope = morph_norm(g);
     if (!(slope > 1e-6)) return false; /* a ridge inside the target: neighbours will lead out */
@@ -172,8 +162,8 @@ static bool set_plane(const morph_blanket_state *b, morph_contact *c, const doub
     return true;
 }
 
-static morph_contact *add_contact(morph_blanket_state *b, const int *joint, int corners, const double *weight,
-                                  int source) {
+morph_contact *morph_blanket_add_contact(morph_blanket_state *b, const int *joint, int corners,
+                                         const double *weight, int source) {
     morph_contact *c = &b->contact[b->contacts];
     memset(c, 0, sizeof *c);
     c->corners = corners;
@@ -186,25 +176,29 @@ static morph_contact *add_contact(morph_blanket_state *b, const int *joint, int 
         sum += weight[k] * c->share[k];
     }
     c->inverse = sum > 0.0 ? 1.0 / sum : 0.0; /* all held: nothing to correct */
-    place_of(b->before, c->joint, c->corners, c->weight, c->before);
+    morph_blanket_place(b->before, c->joint, c->corners, c->weight, c->before);
     if (source < b->touches) c->before[2] += b->lift_to - b->lift; /* friction holds to the target */
     return c;
 }
 
 /* A place that moves far in a step is followed along its way, in strides that the distance's slope makes
  * safe: where it first comes near the target, the half space stands there, on the side it came from. What
- * moves less than its radius cannot pass the middle of even the thinnest target. */
-static bool swept(const morph_blanket_state *b, morph_contact *c, const double *x, double radius) {
+ * moves less than its radius cannot pass the middle of even the thinnest target. `end`: the gap where it
+ * ends; nothing is nearer in between where the distance could not fall and rise again on what is left of the
+ * way. */
+static bool swept(const morph_blanket_state *b, morph_contact *c, const double *x, double radius,
+                  double end) {
     double q0[3], q1[3], way[3], g[3], t = 0.0;
     memcpy(q0, c->before, sizeof q0);
-    place_of(x, c->joint, c->corners, c->weight, q1);
+    morph_blanket_place(x, c->joint, c->corners, c->weight, q1);
     morph_sub(q1, q0, way);
     const double length = morph_norm(way), close = SWEPT_CLOSE * radius;
     if (!(length > SWEPT_FROM * radius)) return false;
     for (int k = 0; k < SWEPT_STRIDES; k++) {
         const double q[3] = {q0[0] + t * way[0], q0[1] + t * way[1], q0[2] + t * way[2]};
-        const double gap = distance_at(b, q, g) - radius;
+        const double gap = morph_blanket_distance_at(b, q, NULL) - radius;
         if (gap <= close || k + 1 == SWEPT_STRIDES) {
+            morph_blanket_distance_at(b, q, g);
             const double slope = morph_norm(g);
             if (!(slope > 1e-6) || morph_dot(g, way) >= 0.0) return false; /* leaves: the end decides */
             for (int m = 0; m < 3; m++)
@@ -214,18 +208,19 @@ static bool swept(const morph_blanket_state *b, morph_contact *c, const double *
             c->radius = -1.0; /* the plane stays */
             return true;
         }
+        if (gap + end > MOST_SLOPE * (1.0 - t) * length + 2.0 * close) return false;
         t += gap / (MOST_SLOPE * length);
         if (t >= 1.0) return false;
     }
     return false;
 }
 
-/* How far the place is from where it would have to be listed, at least: by its last distance and what it has
- * moved since; negative where that cannot tell. */
-static double spare_since(const morph_blanket_state *b, const morph_touch *t, const double q[3],
-                          double listed) {
+/* How far the place is from contact, at least: by its last distance and what it has moved since, `by`;
+ * negative where that cannot tell. */
+static double spare_since(const morph_blanket_state *b, const morph_touch *t, const double q[3], double *by) {
     const double p[3] = {q[0], q[1], q[2] - b->lift_to};
-    return t->known ? (t->phi - t->radius - listed) / MOST_SLOPE - morph_dist(p, t->at) : -1.0;
+    *by = t->known ? morph_dist(p, t->at) : INFINITY;
+    return (t->phi - t->radius) / MOST_SLOPE - *by;
 }
 
 bool morph_blanket_sleeps(const morph_blanket_state *b, int touch) {
@@ -243,10 +238,19 @@ static double reach_of(const morph_blanket_state *b, int span) {
 static void find_target(morph_blanket_state *b, morph_touch *t, const double *x, double been, double reach) {
     const double listed = b->added, lift = fabs(b->lift_to - b->lift);
     double q[3], from[3], *wake = &b->touch_wake[t - b->touch];
-    place_of(x, t->joint, t->corners, t->weight, q);
-    place_of(b->before, t->joint, t->corners, t->weight, from);
+    morph_blanket_place(x, t->joint, t->corners, t->weight, q);
+    morph_blanket_place(b->before, t->joint, t->corners, t->weight, from);
     const double own = listed + morph_dist(q, from) + lift;
-    if (t->stride == 0.0 && spare_since(b, t, q, own) > 0.0) return;
+    if (t->stride == 0.0) {
+        double by;
+        const double spare = spare_since(b, t, q, &by);
+        if (spare > reach) {
+            *wake = been + spare - b->move[t->span] - lift;
+            return;
+        }
+        /* Not while a new distance would let it sleep. */
+        if (spare > own / MOST_SLOPE && spare + by < reach) return;
+    }
     const bool moved = has_moved(b, t, q);
     double gap = distance_of(b, t, q, NULL) - t->radius;
     if (t->stride == 0.0 && gap / MOST_SLOPE > reach) {
@@ -254,14 +258,14 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
         return;
     }
     /* What rests has found its deepest place; exact distances look after it from frame to frame. */
-    if (t->stride > SHORTEST_STRIDE || (t->stride > 0.0 && moved))
-        gap = seek(b, t, x, gap + t->radius) - t->radius;
+    if (t->stride > MORPH_BLANKET_SHORTEST_STRIDE || (t->stride > 0.0 && moved))
+        gap = seek(b, t, x, q, gap + t->radius) - t->radius;
     if (gap > own) {
         if (t->stride > 0.0) *wake = been + (gap - listed) / 8.0;
         return;
     }
-    morph_contact *c = add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
-    if (swept(b, c, x, t->radius) || set_plane(b, c, x, t->radius)) b->contacts++;
+    morph_contact *c = morph_blanket_add_contact(b, t->joint, t->corners, t->weight, (int)(t - b->touch));
+    if (swept(b, c, x, t->radius, gap) || set_plane(b, c, x, t->radius)) b->contacts++;
 }
 
 /* The places of a span that may touch in this step. */
@@ -276,12 +280,12 @@ static void find_span(morph_blanket_state *b, int span, const double *x) {
 }
 
 /* Links and skin lie above the plane wherever their joints do. */
-static void find_base(morph_blanket_state *b, const double *x, double move) {
+void morph_blanket_find_base(morph_blanket_state *b, const double *x, double move) {
     static const double whole = 1.0;
     const double radius = b->structure->def.radius, near = NEAR * b->structure->spacing + move;
     for (int j = 0; j < b->joints; j++) {
         if (x[3 * j + 2] > b->def.base + radius + near) continue;
-        morph_contact *c = add_contact(b, &j, 1, &whole, b->touches + j);
+        morph_contact *c = morph_blanket_add_contact(b, &j, 1, &whole, b->touches + j);
         c->normal[2] = 1.0;
         c->level = b->def.base + radius + CONTACT_MARGIN * b->structure->spacing;
         c->radius = -1.0;
@@ -291,7 +295,7 @@ static void find_base(morph_blanket_state *b, const double *x, double move) {
 
 void morph_blanket_forget(morph_blanket_state *b) {
     for (int t = 0; t < b->angles; t++)
-        b->angle[t].push[0] = b->angle[t].push[1] = 0.0;
+        b->turn[t].push[0] = b->turn[t].push[1] = 0.0;
     memset(b->touch_wake, 0, (size_t)b->touches * sizeof *b->touch_wake);
     memset(b->span_wake, 0,
            (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake);
@@ -321,7 +325,7 @@ void morph_blanket_find_contacts(morph_blanket_state *b, const double *x) {
     const int spans = b->touches > 0 ? b->joints + b->links + b->structure->skin_triangles : 0;
     for (int n = 0; n < spans; n++)
         if (!(b->path[n] + b->lift_path + reach_of(b, n) < b->span_wake[n])) find_span(b, n, x);
-    if (!isnan(b->def.base)) find_base(b, x, move);
+    if (!isnan(b->def.base)) morph_blanket_find_base(b, x, move);
     if (b->soft) morph_blanket_soft_find(b, x, NEAR * b->structure->spacing + move);
 }
 
@@ -358,11 +362,12 @@ static void set_drag(morph_contact *c, const double want[3], double friction, do
  * most friction times the normal push (Coulomb; sticking inside the cone, sliding on it). */
 double morph_blanket_project_contact(morph_contact *c, double *x, double friction, double *gap_out) {
     double q[3], change[3], want[3];
-    place_of(x, c->joint, c->corners, c->weight, q);
+    morph_blanket_place(x, c->joint, c->corners, c->weight, q);
     const double gap = morph_dot(c->normal, q) - c->level;
     const double old = c->push;
     if (gap_out) *gap_out = gap;
-    c->push = fmax(0.0, old - gap * c->inverse);
+    const double push = old - gap * c->inverse;
+    c->push = push > 0.0 ? push : 0.0;
     if (c->push == 0.0 && old == 0.0) return 0.0;
     for (int k = 0; k < 3; k++) {
         change[k] = (c->push - old) * c->normal[k];
@@ -403,7 +408,7 @@ void morph_blanket_keep_contacts(morph_blanket_state *b) {
     if (b->soft) morph_blanket_soft_keep(b);
 }
 
-static double base_depth(const morph_blanket_state *b, const double *x) {
+double morph_blanket_base_depth(const morph_blanket_state *b, const double *x) {
     double depth = 0.0;
     for (int j = 0; j < b->joints && !isnan(b->def.base); j++)
         depth = fmax(depth, b->def.base + b->structure->def.radius - x[3 * j + 2]);
@@ -411,143 +416,13 @@ static double base_depth(const morph_blanket_state *b, const double *x) {
 }
 
 double morph_blanket_depth(const morph_blanket_state *b, const double *x) {
-    double depth = base_depth(b, x);
+    double depth = morph_blanket_base_depth(b, x);
     for (int k = 0; k < b->touches; k++) {
         const morph_touch *t = &b->touch[k];
         if (morph_blanket_sleeps(b, k)) continue;
         double q[3];
-        place_of(x, t->joint, t->corners, t->weight, q);
-        depth = fmax(depth, t->radius - distance_at(b, q, NULL));
+        morph_blanket_place(x, t->joint, t->corners, t->weight, q);
+        depth = fmax(depth, t->radius - morph_blanket_distance_at(b, q, NULL));
     }
     return depth;
-}
-
-/* Corners of an element as the target sees them. */
-static void place_element(const morph_blanket_state *b, const double *x, const int *joint, int corners,
-                          double v[3][3]) {
-    for (int k = 0; k < corners; k++) {
-        memcpy(v[k], &x[3 * joint[k]], sizeof v[k]);
-        v[k][2] -= b->lift_to;
-    }
-}
-
-/* Elements that may touch: skin triangles and the links that are no edges of them. */
-typedef struct element {
-    const int *joint;
-    int corners;
-    double radius;
-    bool tested;
-} element;
-
-static element element_of(const morph_structure *s, int n) {
-    if (n >= s->links) return (element){s->skin[n - s->links], 3, s->def.radius, true};
-    return (element){s->link[n], 2, s->link_radius[n], s->link_kind[n] != MORPH_LINK_BOTTOM};
-}
-
-/* Exact distance of an element from where its deepest place was last time. Beyond NEAR nobody asks how far.
- */
-static void measure(const morph_blanket_state *b, const element *e, const double v[3][3], morph_memo *memo) {
-    const double enough = e->radius + 1.01 * NEAR * b->structure->spacing;
-    double sum = 0.0, weight[3];
-    morph_closest at;
-    for (int k = 0; k < e->corners; k++)
-        sum += memo->weight[k];
-    for (int k = 0; k < 3; k++)
-        weight[k] = k >= e->corners ? 0.0 : sum > 0.5 ? memo->weight[k] : 1.0 / e->corners;
-    morph_distance_element(b->exact, v, e->corners, enough, weight, &at);
-    memcpy(memo->weight, weight, sizeof weight);
-    memcpy(memo->normal, at.normal, sizeof memo->normal);
-    memcpy(memo->point, at.point, sizeof memo->point);
-    memcpy(memo->corner, v, sizeof memo->corner);
-    memo->gap = at.distance - e->radius;
-    memo->bounded = at.triangle < 0;
-    memo->known = memo->fresh = true;
-}
-
-static double moved_since(const morph_memo *memo, const double v[3][3], int corners) {
-    double moved = 0.0;
-    for (int k = 0; k < corners; k++)
-        moved = fmax(moved, morph_dist(v[k], memo->corner[k]));
-    return moved;
-}
-
-/* What moved has come nearer by no more than it moved. A convex target lies wholly behind the plane through
- * the closest point: an element that slides along it stays clear however far. */
-double morph_blanket_gap_bound(const morph_blanket_state *b, int n, const double v[3][3]) {
-    const morph_memo *memo = &b->memo[n];
-    const element e = element_of(b->structure, n);
-    if (!memo->known) return -INFINITY;
-    const double bound = memo->gap - moved_since(memo, v, e.corners);
-    if (!b->convex || memo->bounded || !(memo->gap + e.radius > 0.0)) return bound;
-    double least = INFINITY;
-    for (int k = 0; k < e.corners; k++) {
-        double d[3];
-        morph_sub(v[k], memo->point, d);
-        least = fmin(least, morph_dot(memo->normal, d));
-    }
-    return fmax(bound, least - e.radius);
-}
-
-double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
-    const morph_structure *s = b->structure;
-    const double allowed = 0.5 * MORPH_BLANKET_CLEARANCE_HELD * s->spacing;
-    double depth = base_depth(b, x);
-    for (int n = 0; n < s->links + s->skin_triangles; n++) {
-        const element e = element_of(s, n);
-        if (!e.tested) continue;
-        morph_memo *memo = &b->memo[n];
-        double v[3][3] = {{0.0}};
-        place_element(b, x, e.joint, e.corners, v);
-        const double bound = morph_blanket_gap_bound(b, n, (const double(*)[3])v);
-        depth = fmax(depth, bound >= -allowed ? -bound : 0.0);
-        if (bound >= -allowed) continue;
-        measure(b, &e, (const double(*)[3])v, memo);
-        depth = fmax(depth, -memo->gap);
-    }
-    return depth;
-}
-
-void morph_blanket_seek_deepest(morph_blanket_state *b) {
-    const morph_structure *s = b->structure;
-    for (int n = 0; n < s->links + s->skin_triangles; n++) {
-        morph_memo *memo = &b->memo[n];
-        if (!memo->fresh) continue;
-        memo->fresh = false;
-        if (memo->bounded || memo->gap > NEAR * s->spacing) continue;
-        morph_touch *t = &b->touch[memo->touch];
-        double q[3];
-        place_of(b->x, t->joint, t->corners, t->weight, q);
-        const double here = distance_at(b, q, NULL) - t->radius;
-        if (memo->gap >= -MORPH_BLANKET_CLEARANCE_HELD * s->spacing &&
-            memo->gap > here - SEEK_GAIN * s->spacing)
-            continue;
-        memcpy(t->weight, memo->weight, sizeof t->weight);
-        t->stride = SHORTEST_STRIDE;
-        b->touch_wake[memo->touch] = b->span_wake[t->span] = 0.0;
-    }
-}
-
-/* One contact at the deepest place of an element, as it was found when the element was last measured: what
- * has moved since far enough to matter has just been measured again. */
-static void find_deepest(morph_blanket_state *b, const double *x, int n) {
-    const element e = element_of(b->structure, n);
-    const morph_memo *memo = &b->memo[n];
-    double v[3][3];
-    if (!e.tested || !memo->known || memo->bounded) return;
-    place_element(b, x, e.joint, e.corners, v);
-    if (memo->gap - moved_since(memo, (const double(*)[3])v, e.corners) > NEAR * b->structure->spacing)
-        return;
-    morph_contact *c = add_contact(b, e.joint, e.corners, memo->weight, 0);
-    memcpy(c->normal, memo->normal, sizeof c->normal);
-    c->level = morph_dot(c->normal, memo->point) + c->normal[2] * b->lift_to + e.radius +
-               CONTACT_MARGIN * b->structure->spacing;
-    c->radius = -1.0; /* the plane stays */
-    b->contacts++;
-}
-
-void morph_blanket_find_exact(morph_blanket_state *b, const double *x) {
-    b->contacts = 0;
-    for (int n = 0; n < b->structure->links + b->structure->skin_triangles; n++)
-        find_deepest(b, x, n);
-    if (!isnan(b->def.base)) find_base(b, x, 0.0);
 }

@@ -76,7 +76,7 @@ static void add_squares(morph_blanket_state *b) {
     for (int t = 0; t < b->structure->link_posts; t++) {
         const morph_angle *a = &b->angle[t];
         double c, grad[4][3];
-        if (!morph_blanket_cosine_gradient(a, b->x, &c, grad)) continue;
+        if (!morph_blanket_cosine_gradient(b, t, b->x, &c, grad)) continue;
         for (int j = 0; j < a->joints; j++)
             for (int k = 0; k < 3; k++)
                 b->a[3 * a->joint[j] + k] -= scale * c * grad[j][k];
@@ -129,7 +129,7 @@ double morph_blanket_energy(const morph_blanket_state *b) {
     const double square = square_of(b->structure, &b->def);
     double kinetic, spring, height = 0.0, attraction = 0.0, angles = morph_blanket_angle_energy(b);
     for (int t = 0; t < b->structure->link_posts && square > 0.0; t++) {
-        const double c = morph_blanket_cosine(&b->angle[t], b->x);
+        const double c = morph_blanket_cosine(b, t, b->x);
         angles += 0.5 * square * c * c;
     }
     morph_blanket_energies(b, &kinetic, &spring);
@@ -145,47 +145,8 @@ double morph_blanket_energy(const morph_blanket_state *b) {
 }
 
 /* exp(-2 beta) to second order, without ringing when beta is large. */
-static double decay(double beta) {
+double morph_blanket_decay(double beta) {
     return beta < 1.0 ? (1.0 - beta) / (1.0 + beta) : 0.0;
-}
-
-/* One damper alone: the speed w at which its ends part obeys w' = -(2 c / m) w, their mean stays. */
-static void damp_pair(morph_blanket_state *b, const int ends[2], double factor) {
-    double *vi = &b->v[3 * ends[0]], *vj = &b->v[3 * ends[1]], d[3], w[3];
-    morph_sub(&b->x[3 * ends[1]], &b->x[3 * ends[0]], d);
-    morph_sub(vj, vi, w);
-    const double square = morph_dot(d, d);
-    if (!(square > 0.0)) return;
-    const double wi = b->weight[ends[0]], wj = b->weight[ends[1]];
-    if (wi + wj == 0.0) return;
-    const double change = (1.0 - factor) * morph_dot(w, d) / (square * (wi + wj));
-    for (int k = 0; k < 3; k++) {
-        vi[k] += wi * change * d[k];
-        vj[k] -= wj * change * d[k];
-    }
-}
-
-/* Strength of an angle's damper in parts of a link's. Enough to end the swinging of the free motions within 2
- * to 3 s (with 0.1 it goes on, and with 1 leaning posts take seconds to sink). */
-#define ANGLE_DAMPING 0.3
-
-/* Dampers over a time h, one after the other: each is exact to second order and takes energy away at any
- * step. The order is turned round in a step's second half, which makes the composition symmetric and so of
- * second order. Beside the links' dampers, every angle has one between the far ends of its arms: the free
- * motions, which change no length (all cells shear, posts lean), would swing on for many seconds otherwise.
- */
-static void damp(morph_blanket_state *b, double h, bool backward) {
-    const double beta = b->structure->def.damping / b->structure->def.mass * h;
-    const double link = decay(beta), angle = decay(ANGLE_DAMPING * beta);
-    if (beta == 0.0) return;
-    const int all = b->links + b->angles;
-    for (int n = 0; n < all; n++) {
-        const int k = backward ? all - 1 - n : n;
-        if (k < b->links)
-            damp_pair(b, b->structure->link[k], link);
-        else
-            damp_pair(b, b->angle[k - b->links].far, angle);
-    }
 }
 
 static void kick(morph_blanket_state *b, double h) {
@@ -194,7 +155,7 @@ static void kick(morph_blanket_state *b, double h) {
 }
 
 static void drag(morph_blanket_state *b, double h) {
-    const double factor = decay(0.5 * b->def.drag * h);
+    const double factor = morph_blanket_decay(0.5 * b->def.drag * h);
     for (int k = 0; k < 3 * b->joints; k++)
         b->v[k] *= factor;
 }
@@ -228,6 +189,9 @@ static double step_work(const morph_blanket_state *b) {
     return work;
 }
 
+/* Steps that move further than this, radii, may be looked at by the guard. */
+#define PLANES_MOVE 0.1
+
 /* What the projection moved becomes velocity, so an impact is plastic and a held constraint carries no speed.
  */
 static void take_velocity(morph_blanket_state *b) {
@@ -260,6 +224,7 @@ static bool drift(morph_blanket_state *b) {
         if (b->changed <= MORPH_BLANKET_SWEPT * b->structure->spacing) break;
     }
     morph_blanket_keep_contacts(b);
+    if (morph_blanket_moved(b, b->x) > PLANES_MOVE * b->structure->def.radius) morph_blanket_renew_planes(b);
     if (!morph_blanket_guard(b)) return false;
     if (b->soft) morph_blanket_soft_moved(b);
     take_velocity(b);
@@ -273,14 +238,14 @@ bool morph_blanket_step(morph_blanket_state *b) {
     const double h = 0.5 * b->step;
     morph_blanket_schedule(b);
     drag(b, h);
-    damp(b, h, false);
+    morph_blanket_damp(b, h, false);
     kick(b, h);
     if (!drift(b)) return false;
     b->time += b->step;
     b->lift = b->lift_to;
     morph_blanket_accelerations(b);
     kick(b, h);
-    damp(b, h, true);
+    morph_blanket_damp(b, h, true);
     drag(b, h);
     return morph_blanket_finite(b);
 }

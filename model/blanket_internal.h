@@ -40,20 +40,30 @@ typedef struct morph_contact {
     double drag[3];   /* accumulated friction, at most friction * push */
 } morph_contact;
 
-/* Angle between u and v as floor <= cos <= ceiling; joint[k] enters u with su[k] and v with sv[k]. */
+/* What every complete sweep asks of an angle between u and v, floor <= cos <= ceiling: apart from the rest,
+ * so that the many that are in no need of correction stay in the cache. */
+typedef struct morph_turn {
+    int u[2], v[2];        /* an arm leads from its first joint to its second */
+    double floor, ceiling; /* aimed at, a little inside */
+    double push[2];        /* accumulated corrections of this step: at floor, at ceiling */
+} morph_turn;
+
+/* The rest of it; joint[k] enters u with su[k] and v with sv[k]. */
 typedef struct morph_angle {
     int joint[4], joints;
-    int u[2], v[2]; /* an arm leads from its first joint to its second */
-    int far[2];     /* where the arms end */
     double su[4], sv[4];
     double weight[4];       /* of its joints */
-    double floor, ceiling;  /* aimed at, a little inside */
     double lowest, highest; /* the structure's limits */
-    double push[2];         /* accumulated corrections of this step: at floor, at ceiling */
     /* As the last complete sweep found it: cos = level + sum grad.x, and 1 / sum |grad|^2. */
     double grad[4][3], level, inverse, size, most;
     bool linear; /* these are known */
 } morph_angle;
+
+/* A damper between two joints: of a link, or of so many angles at once. */
+typedef struct morph_damper {
+    int joint[2], angles; /* 0: of a link */
+    int number;           /* in the structure's order */
+} morph_damper;
 
 /* Sweeps of a step; the limits' margins absorb what is left. */
 #define MORPH_BLANKET_SWEEPS 12
@@ -64,6 +74,9 @@ typedef struct morph_angle {
 
 /* Sweeps end when none of their corrections moves a joint further, spacings: a fiftieth of those margins. */
 #define MORPH_BLANKET_SWEPT 2e-6
+
+/* Least stride of the search for the deepest place on an element, in barycentric weight. */
+#define MORPH_BLANKET_SHORTEST_STRIDE 0.01
 
 /* What counts as held: lengths a tenth of a millionth part of what a link moves through, clearance what a
  * plan's clearance is checked to (spacings); panels what a plan's are checked to (sine), posts
@@ -78,9 +91,11 @@ typedef struct morph_memo {
     double corner[3][3], gap;
     double weight[3];           /* of the deepest place */
     double normal[3], point[3]; /* there: gradient of the distance, closest point of the target */
-    bool bounded;               /* gap is only a lower bound: all but corner and gap are not known */
-    int touch;                  /* the place that seeks on it */
-    bool known, fresh;          /* fresh: taken since the last morph_blanket_seek_deepest */
+    bool bounded;      /* gap is only a lower bound, the others are of some other place of the element */
+    int touch;         /* the place that seeks on it */
+    int vertex;        /* of a convex target, where the last climb ended, from 1; 0: nowhere */
+    bool planar;       /* by a plane that has all of the target behind it */
+    bool known, fresh; /* fresh: taken since the last morph_blanket_seek_deepest */
 } morph_memo;
 
 /* How far the state is from its limits; violations are >= 0. */
@@ -105,6 +120,7 @@ typedef struct morph_guard {
     bool known, blind; /* the field does not feel parts of the target */
 } morph_guard;
 
+typedef struct morph_blanket_hull morph_blanket_hull;
 typedef struct morph_blanket_fix morph_blanket_fix;
 typedef struct morph_blanket_self morph_blanket_self;
 typedef struct morph_blanket_soft morph_blanket_soft;
@@ -114,6 +130,7 @@ typedef struct morph_blanket_state {
     const morph_sdf *sdf;        /* NULL: no target */
     const morph_distance *exact; /* may be NULL */
     bool convex;                 /* so is the target of `exact` */
+    morph_blanket_hull *hull;    /* of that; may be NULL */
     morph_blanket_def def;
     int joints, links, posts, angles, touches, contacts;
     double step;          /* s */
@@ -141,7 +158,8 @@ typedef struct morph_blanket_state {
      * the fastest of its corners moved, its move how far in this step, m; lift_path the same of the target.
      */
     double *path, *move, lift_path;
-    int (*angle_ends)[4]; /* of both arms */
+    int (*angle_far)[2]; /* where both arms end, apart from the corner */
+    double *come;        /* joints: path and move of this step */
     /* Path lengths, of links by the sum of their ends', of angles by that of all ends of both arms, before
      * which a link or an angle cannot reach a limit; of places by their span's and the target's, before which
      * they cannot touch; of spans, the least of their places'. */
@@ -155,6 +173,9 @@ typedef struct morph_blanket_state {
     bool hot_backward; /* listed in a backward sweep */
     double added;   /* what sweeps may add to the motion of a step or a frame, m: what is nearer is listed */
     double stirred; /* largest motion by a correction in the last sweep, m */
+    morph_turn *turn; /* angles */
+    morph_damper *damper;
+    int dampers;
     morph_angle *angle;
     morph_blanket_fix *fix; /* equalities solved together */
     morph_blanket_self *self;
@@ -194,6 +215,14 @@ double morph_blanket_energy(const morph_blanket_state *b);
 void morph_blanket_energies(const morph_blanket_state *b, double *kinetic, double *spring); /* J */
 /* One step of b->step. False when the state is not finite any more or moves further than most_move. */
 bool morph_blanket_step(morph_blanket_state *b);
+
+/* exp(-2 beta) to second order, without ringing when beta is large. */
+double morph_blanket_decay(double beta);
+
+/* blanket_damp.c */
+morph_status morph_blanket_dampers_create(morph_blanket_state *b); /* after the limits */
+/* Velocities after a time h, s. */
+void morph_blanket_damp(morph_blanket_state *b, double h, bool backward);
 
 /* blanket_angle.c: the springs at the angle limits (structure.def.angle_stiffness). */
 void morph_blanket_add_angles(morph_blanket_state *b);           /* to a */
@@ -237,8 +266,9 @@ bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *
                              double grad[4][3]);
 double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
 /* The same with its gradient by the angle's joints, those held 0; false where it has none. */
-bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]);
-double morph_blanket_cosine(const morph_angle *a, const double *x);
+bool morph_blanket_cosine_gradient(const morph_blanket_state *b, int angle, const double *x, double *c,
+                                   double grad[4][3]);
+double morph_blanket_cosine(const morph_blanket_state *b, int angle, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
 /* blanket_polish.c: what the unpolished state breaks. */
@@ -277,17 +307,46 @@ void morph_blanket_find_contacts(morph_blanket_state *b, const double *x);
 void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x);
 /* Deepest violation of a place's radius or the base plane at x, m, >= 0. */
 double morph_blanket_depth(const morph_blanket_state *b, const double *x);
-/* The same by exact distances over whole links and triangles. An element that has moved less than its last
- * distance left over and half of what counts as held is not measured again: its bound counts. */
+double morph_blanket_base_depth(const morph_blanket_state *b, const double *x); /* the plane's part of it */
+/* The smooth distance at q, the target's lift taken off; g may be NULL. */
+double morph_blanket_distance_at(const morph_blanket_state *b, const double q[3], double *g);
+/* The next contact of the list, with its place but no plane yet; not counted. */
+morph_contact *morph_blanket_add_contact(morph_blanket_state *b, const int *joint, int corners,
+                                         const double *weight, int source);
+void morph_blanket_find_base(morph_blanket_state *b, const double *x, double move);
+static inline void morph_blanket_place(const double *x, const int *joint, int corners, const double *weight,
+                                       double q[3]) {
+    const double *a = &x[3 * joint[0]], wa = weight[0];
+    for (int k = 0; k < 3; k++)
+        q[k] = wa * a[k];
+    for (int j = 1; j < corners; j++) {
+        const double *c = &x[3 * joint[j]], wc = weight[j];
+        for (int k = 0; k < 3; k++)
+            q[k] += wc * c[k];
+    }
+}
+
+/* blanket_exact.c */
+/* Neighbours of the vertices of a convex mesh, which is borrowed; *out is NULL where edges do not fit
+ * together.
+ */
+morph_status morph_blanket_hull_create(const morph_mesh *mesh, morph_blanket_hull **out);
+void morph_blanket_hull_destroy(morph_blanket_hull *h); /* NULL allowed */
+/* Deepest violation by exact distances over whole links and triangles. An element that has moved less than
+ * its last distance left over and half of what counts as held is not measured again: its bound counts. */
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
 /* At least how far an element is from the target beyond its radius, by its last exact distance: corners as
  * the target sees them. Negative infinity where nothing is known. */
 double morph_blanket_gap_bound(const morph_blanket_state *b, int element, const double v[3][3]);
+/* Planes anew between a convex target and what those known no longer keep from it at x: for the guard. */
+void morph_blanket_renew_planes(morph_blanket_state *b);
 /* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
  * between the fixed places is then felt by the steps that follow. */
 void morph_blanket_seek_deepest(morph_blanket_state *b);
 /* Lists the contacts near x by exact distances. */
 void morph_blanket_find_exact(morph_blanket_state *b, const double *x);
+
+/* blanket_contact.c again */
 /* Part of project_start; most: largest push to start with, m. */
 void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm, double most);
 void morph_blanket_keep_contacts(morph_blanket_state *b); /* for the next step's start */

@@ -35,7 +35,7 @@ static morph_violation member_violation(const morph_blanket_state *b, const doub
     for (int p = 0; p < s->panels; p++)
         worst.panel = fmax(worst.panel, fabs(morph_blanket_panel_sine(s, p, x)));
     for (int t = 0; t < b->angles && angles; t++) {
-        const double c = morph_blanket_cosine(&b->angle[t], x);
+        const double c = morph_blanket_cosine(b, t, x);
         const double over = fmax(b->angle[t].lowest - c, c - b->angle[t].highest);
         if (over <= worst.angle) continue;
         worst.angle = over;
@@ -96,7 +96,7 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
                  spans = (size_t)(b->joints + b->links + b->structure->skin_triangles) * sizeof *b->span_wake;
     memcpy(b->spare_push, b->push, push);
     for (int t = 0; t < b->angles; t++)
-        memcpy(b->spare_angle[t], b->angle[t].push, sizeof *b->spare_angle);
+        memcpy(b->spare_angle[t], b->turn[t].push, sizeof *b->spare_angle);
     const bool exact = b->exact && (b->sdf || b->soft);
     /* By exact distances no place moves and none falls asleep. */
     if (!exact) {
@@ -110,7 +110,7 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
     if (b->soft) morph_blanket_soft_release(b);
     memcpy(b->push, b->spare_push, push);
     for (int t = 0; t < b->angles; t++)
-        memcpy(b->angle[t].push, b->spare_angle[t], sizeof *b->spare_angle);
+        memcpy(b->turn[t].push, b->spare_angle[t], sizeof *b->spare_angle);
     if (!exact) {
         memcpy(b->touch, b->spare_touch, touch);
         memcpy(b->touch_wake, b->spare_wake, wake);

@@ -26,11 +26,12 @@ static double squared(double x) {
 #define MOST_CARRIED 16.0
 
 /* Joints of a tuple with their parts in u and v. */
-static void set_angle(morph_angle *a, const int uj[2], const int vj[2], const double limit[2]) {
+static void set_angle(morph_angle *a, morph_turn *t, int far[2], const int uj[2], const int vj[2],
+                      const double limit[2]) {
     a->joints = 0;
     for (int k = 0; k < 2; k++) {
-        a->u[k] = uj[k];
-        a->v[k] = vj[k];
+        t->u[k] = uj[k];
+        t->v[k] = vj[k];
     }
     for (int k = 0; k < 4; k++) {
         const int joint = k < 2 ? uj[k] : vj[k - 2];
@@ -46,12 +47,12 @@ static void set_angle(morph_angle *a, const int uj[2], const int vj[2], const do
     /* The joint in both arms is the corner, the others their far ends. */
     int ends = 0;
     for (int k = 0; k < a->joints; k++)
-        if ((a->su[k] == 0.0) != (a->sv[k] == 0.0) && ends < 2) a->far[ends++] = a->joint[k];
+        if ((a->su[k] == 0.0) != (a->sv[k] == 0.0) && ends < 2) far[ends++] = a->joint[k];
     const double margin = fmin(ANGLE_MARGIN, 0.25 * (limit[1] - limit[0]));
     a->highest = cos(limit[0]);
     a->lowest = cos(limit[1]);
-    a->ceiling = cos(limit[0] + margin);
-    a->floor = cos(limit[1] - margin);
+    t->ceiling = cos(limit[0] + margin);
+    t->floor = cos(limit[1] - margin);
 }
 
 morph_status morph_blanket_limits_create(morph_blanket_state *b) {
@@ -62,15 +63,17 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle = morph_alloc((size_t)b->angles, sizeof *b->angle);
     b->spare_push = morph_alloc((size_t)b->links, sizeof *b->spare_push);
     b->spare_angle = morph_alloc((size_t)b->angles, sizeof *b->spare_angle);
-    b->angle_ends = morph_alloc((size_t)b->angles, sizeof *b->angle_ends);
+    b->angle_far = morph_alloc((size_t)b->angles, sizeof *b->angle_far);
+    b->turn = morph_alloc((size_t)b->angles, sizeof *b->turn);
+    b->come = morph_alloc((size_t)b->joints, sizeof *b->come);
     b->link_wake = morph_alloc((size_t)b->links, sizeof *b->link_wake);
     b->near_link = morph_alloc((size_t)b->links, sizeof *b->near_link);
     b->near_angle = morph_alloc((size_t)b->angles, sizeof *b->near_angle);
     b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
     b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
     b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
-    if (!b->angle_ends || !b->link_wake || !b->near_link || !b->near_angle || !b->angle_wake ||
-        !b->hot_link || !b->hot_angle)
+    if (!b->angle_far || !b->turn || !b->come || !b->link_wake || !b->near_link || !b->near_angle ||
+        !b->angle_wake || !b->hot_link || !b->hot_angle)
         return MORPH_ERR_NOMEM;
     if (!b->bound || !b->limit || !b->push || !b->angle || !b->spare_push || !b->spare_angle)
         return MORPH_ERR_NOMEM;
@@ -85,15 +88,14 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     int n = 0, uj[2], vj[2];
     for (int t = 0; t < s->link_posts; t++) {
         morph_link_post_joints(s, t, uj, vj);
-        set_angle(&b->angle[n++], uj, vj, s->link_post_limit[t]);
+        set_angle(&b->angle[n], &b->turn[n], b->angle_far[n], uj, vj, s->link_post_limit[t]);
+        n++;
     }
     for (int t = 0; t < s->link_links; t++) {
         morph_link_link_joints(s, t, uj, vj);
-        set_angle(&b->angle[n++], uj, vj, s->link_link_limit[t]);
+        set_angle(&b->angle[n], &b->turn[n], b->angle_far[n], uj, vj, s->link_link_limit[t]);
+        n++;
     }
-    for (int t = 0; t < n; t++)
-        for (int k = 0; k < 4; k++)
-            b->angle_ends[t][k] = k < 2 ? b->angle[t].u[k] : b->angle[t].v[k - 2];
     for (int t = 0; t < n; t++)
         for (int k = 0; k < b->angle[t].joints; k++)
             b->angle[t].weight[k] = b->weight[b->angle[t].joint[k]];
@@ -101,15 +103,20 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
 }
 
 static void note(morph_blanket_state *b, double motion) {
-    b->changed = fmax(b->changed, fabs(motion));
+    const double size = fabs(motion);
+    if (size > b->changed) b->changed = size;
 }
 
 /* Moves two joints apart by q d, each by its weight's share; two held ones stay. */
 static void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj, const double d[3],
                  double q) {
-    const double wi = b->weight[ends[0]], wj = b->weight[ends[1]], sum = wi + wj;
-    if (sum == 0.0) return;
-    const double qi = q * (wi / sum), qj = q * (wj / sum);
+    const double wi = b->weight[ends[0]], wj = b->weight[ends[1]];
+    double qi = 0.5 * q, qj = qi;
+    if (wi + wj == 0.0) return;
+    if (wi != wj) {
+        qi = q * (wi / (wi + wj));
+        qj = q * (wj / (wi + wj));
+    }
     for (int k = 0; k < 3; k++) {
         xi[k] -= qi * d[k];
         xj[k] += qj * d[k];
@@ -150,8 +157,8 @@ static void project_posts(morph_blanket_state *b, double *x) {
 /* An inequality's correction: grows as far as needed, shrinks again when a neighbour has relieved it, never
  * below zero (projected Gauss-Seidel). `gap` < 0 is a violation; returns the change. */
 static double unilateral(double *push, double gap) {
-    const double old = *push;
-    *push = fmax(0.0, old - gap);
+    const double old = *push, now = old - gap;
+    *push = now > 0.0 ? now : 0.0;
     return *push - old;
 }
 
@@ -165,7 +172,8 @@ static bool project_length(morph_blanket_state *b, int l, double *x, double *mot
     const double hot = HOT_LENGTH * b->structure->spacing;
     *motion = 0.0;
     if (push[0] == 0.0 && push[1] == 0.0 && square > squared(limit[0]) && square < squared(limit[1]))
-        return square < squared(limit[0] + hot) || square > squared(fmax(0.0, limit[1] - hot));
+        return square < squared(limit[0] + hot) || (limit[1] > hot && square > squared(limit[1] - hot)) ||
+               !(limit[1] > hot);
     const double length = sqrt(square);
     if (!(length > 0.0)) return true;
     double grow = unilateral(&push[0], length - limit[0]);
@@ -187,7 +195,7 @@ static void start_length(morph_blanket_state *b, int l, double *x, double warm, 
     if (length > 0.0) part(b, ends, &x[3 * ends[0]], &x[3 * ends[1]], d, (push[0] - push[1]) / length);
 }
 
-static void arms(const morph_angle *a, const double *x, double u[3], double v[3]) {
+static inline void arms(const morph_turn *a, const double *x, double u[3], double v[3]) {
     morph_sub(&x[3 * a->u[1]], &x[3 * a->u[0]], u);
     morph_sub(&x[3 * a->v[1]], &x[3 * a->v[0]], v);
 }
@@ -196,9 +204,10 @@ static void arms(const morph_angle *a, const double *x, double u[3], double v[3]
  * su dc/du + sv dc/dv, times its weight. Returns the sum of the gradients' squares; 0 where the arms are
  * parallel, which the limits keep far from, or all joints are held. arm: the shorter arm's length. grad may
  * be NULL, then so may arm, and 0 is returned. */
-static double cosine(const morph_angle *a, const double *x, double *c, double (*grad)[3], double *arm) {
+static double cosine(const morph_turn *t, const morph_angle *a, const double *x, double *c, double (*grad)[3],
+                     double *arm) {
     double u[3], v[3];
-    arms(a, x, u, v);
+    arms(t, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
     *c = scale > 0.0 ? morph_dot(u, v) / scale : 0.0;
     if (!grad || !(scale > 0.0)) return 0.0;
@@ -217,9 +226,9 @@ static double cosine(const morph_angle *a, const double *x, double *c, double (*
     return square * scale > 1e-12 ? square : 0.0;
 }
 
-double morph_blanket_cosine(const morph_angle *a, const double *x) {
+double morph_blanket_cosine(const morph_blanket_state *b, int angle, const double *x) {
     double c;
-    cosine(a, x, &c, NULL, NULL);
+    cosine(&b->turn[angle], &b->angle[angle], x, &c, NULL, NULL);
     return c;
 }
 
@@ -236,7 +245,7 @@ static bool link_near(morph_blanket_state *b, int l, const double *x, double nea
 
 /* With the ends of an arm of length a moving by m in all, it turns by at most m / (a - m); the cosine changes
  * by at most the sum of both turns: with m for both it keeps a distance g where m <= g a / (1 + g). */
-static bool angle_near(const morph_blanket_state *b, morph_angle *a, const double *x, double near,
+static bool angle_near(const morph_blanket_state *b, const morph_turn *a, const double *x, double near,
                        double path, bool note) {
     double u[3], v[3];
     arms(a, x, u, v);
@@ -246,18 +255,18 @@ static bool angle_near(const morph_blanket_state *b, morph_angle *a, const doubl
     const double gap = high < low ? high : low;
     if (!(gap > 0.0)) return true;
     const double spare = gap * sqrt(uu < vv ? uu : vv) / (1.0 + gap) - near;
-    if (note && spare > 0.0) b->angle_wake[a - b->angle] = path + spare;
+    if (note && spare > 0.0) b->angle_wake[a - b->turn] = path + spare;
     return !(spare > 0.0);
 }
 
 static void list_links(morph_blanket_state *b, const double *x, double add, bool all) {
-    const double *path = b->path, *move = b->move;
     b->near_links = 0;
     for (int l = 0; l < b->links; l++) {
         const int *e = b->structure->link[l];
-        const double been = path[e[0]] + path[e[1]], near = 2.0 * add + (all ? 0.0 : move[e[0]] + move[e[1]]);
-        if (!all && been + near < b->link_wake[l]) continue;
-        if (b->def.drive || link_near(b, l, x, near, been, !all))
+        const double come = b->come[e[0]] + b->come[e[1]];
+        if (!all && come + 2.0 * add < b->link_wake[l]) continue;
+        const double own = all ? 0.0 : b->move[e[0]] + b->move[e[1]];
+        if (b->def.drive || link_near(b, l, x, 2.0 * add + own, come - own, !all))
             b->near_link[b->near_links++] = l;
         else
             b->push[l][0] = b->push[l][1] = 0.0;
@@ -265,30 +274,31 @@ static void list_links(morph_blanket_state *b, const double *x, double add, bool
 }
 
 void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all) {
-    const double add = b->added, *path = b->path, *move = b->move;
+    const double add = b->added, *move = b->move;
+    for (int j = 0; j < b->joints; j++)
+        b->come[j] = b->path[j] + move[j];
     list_links(b, x, add, all);
     b->near_angles = 0;
     for (int t = 0; t < b->angles; t++) {
-        const int *e = b->angle_ends[t];
-        const double been = path[e[0]] + path[e[1]] + path[e[2]] + path[e[3]];
-        const double own = all ? 0.0 : move[e[0]] + move[e[1]] + move[e[2]] + move[e[3]];
-        const double near = 4.0 * add + own;
-        if (!all && been + near < b->angle_wake[t]) continue;
-        morph_angle *a = &b->angle[t];
-        if (angle_near(b, a, x, near, been, !all))
+        morph_turn *a = &b->turn[t];
+        const double come = b->come[a->u[0]] + b->come[a->u[1]] + b->come[a->v[0]] + b->come[a->v[1]];
+        if (!all && come + 4.0 * add < b->angle_wake[t]) continue;
+        const double own = all ? 0.0 : move[a->u[0]] + move[a->u[1]] + move[a->v[0]] + move[a->v[1]];
+        if (angle_near(b, a, x, 4.0 * add + own, come - own, !all))
             b->near_angle[b->near_angles++] = t;
         else
             a->push[0] = a->push[1] = 0.0;
     }
 }
 
-bool morph_blanket_cosine_gradient(const morph_angle *a, const double *x, double *c, double grad[4][3]) {
+bool morph_blanket_cosine_gradient(const morph_blanket_state *b, int angle, const double *x, double *c,
+                                   double grad[4][3]) {
     double arm;
-    return cosine(a, x, c, grad, &arm) > 0.0;
+    return cosine(&b->turn[angle], &b->angle[angle], x, c, grad, &arm) > 0.0;
 }
 
 static double clip(double value, double most) {
-    return fmax(-most, fmin(most, value));
+    return value > most ? most : value < -most ? -most : value;
 }
 
 static void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
@@ -304,39 +314,40 @@ static bool cosine_within(const double u[3], const double v[3], double floor, do
     return dot * dot < side * side * (morph_dot(u, u) * morph_dot(v, v));
 }
 
-static bool at_work(const morph_angle *a) {
+static bool at_work(const morph_turn *a) {
     return a->push[0] != 0.0 || a->push[1] != 0.0;
 }
 
 /* Moves the joints by what an angle of cosine c asks for; longest motion by the correction. */
-static double correct_angle(morph_angle *a, double *x, double c) {
-    double change = unilateral(&a->push[0], clip((c - a->floor) * a->inverse, a->most));
-    if (a->push[0] == 0.0) change -= unilateral(&a->push[1], clip((a->ceiling - c) * a->inverse, a->most));
+static double correct_angle(morph_turn *t, const morph_angle *a, double *x, double c) {
+    double change = unilateral(&t->push[0], clip((c - t->floor) * a->inverse, a->most));
+    if (t->push[0] == 0.0) change -= unilateral(&t->push[1], clip((t->ceiling - c) * a->inverse, a->most));
     if (change != 0.0) turn(a, x, (const double(*)[3])a->grad, change);
     return change * a->size;
 }
 
 /* Between complete sweeps the cosine is taken as linear: joints move by fractions of HOT_LENGTH (or all
  * sweeps are complete), over which its second derivatives, at most 4 / arm^2, change it by less than 1e-4. */
-static double linear_angle(morph_angle *a, double *x) {
+static double linear_angle(morph_turn *t, const morph_angle *a, double *x) {
     double c = a->level;
     for (int j = 0; j < a->joints; j++)
         c += morph_dot(a->grad[j], &x[3 * a->joint[j]]);
-    return at_work(a) || c < a->floor || c > a->ceiling ? correct_angle(a, x, c) : 0.0;
+    return at_work(t) || c < t->floor || c > t->ceiling ? correct_angle(t, a, x, c) : 0.0;
 }
 
 /* Near parallel arms the gradient is small and its step far too long: none moves the joints by more than half
  * the shorter arm. *motion: longest by the correction. True if the next sweeps must look at it too. */
-static bool project_angle(morph_angle *a, double *x, double *motion) {
+static bool project_angle(morph_turn *t, morph_angle *a, double *x, double *motion) {
     double c, arm, u[3], v[3];
     *motion = 0.0;
-    a->linear = false;
-    if (!at_work(a)) {
-        arms(a, x, u, v);
-        if (cosine_within(u, v, a->floor + HOT_COSINE, a->ceiling - HOT_COSINE)) return false;
-        if (cosine_within(u, v, a->floor, a->ceiling)) return true;
+    if (!at_work(t)) {
+        arms(t, x, u, v);
+        if (cosine_within(u, v, t->floor + HOT_COSINE, t->ceiling - HOT_COSINE)) return false;
+        a->linear = false;
+        if (cosine_within(u, v, t->floor, t->ceiling)) return true;
     }
-    const double square = cosine(a, x, &c, a->grad, &arm);
+    a->linear = false;
+    const double square = cosine(t, a, x, &c, a->grad, &arm);
     if (square == 0.0) return true;
     a->size = sqrt(square);
     a->inverse = 1.0 / square;
@@ -345,18 +356,18 @@ static bool project_angle(morph_angle *a, double *x, double *motion) {
     a->level = c;
     for (int j = 0; j < a->joints; j++)
         a->level -= morph_dot(a->grad[j], &x[3 * a->joint[j]]);
-    *motion = correct_angle(a, x, c);
+    *motion = correct_angle(t, a, x, c);
     return true;
 }
 
-static void start_angle(morph_angle *a, double *x, double warm, double most) {
+static void start_angle(morph_turn *t, const morph_angle *a, double *x, double warm, double most) {
     double c, arm, grad[4][3];
-    if (a->push[0] == a->push[1]) return;
-    const double square = cosine(a, x, &c, grad, &arm);
+    if (t->push[0] == t->push[1]) return;
+    const double square = cosine(t, a, x, &c, grad, &arm);
     const double limit = square > 0.0 ? most / sqrt(square) : 0.0;
-    a->push[0] = fmin(warm * a->push[0], limit);
-    a->push[1] = fmin(warm * a->push[1], limit);
-    if (square > 0.0) turn(a, x, (const double(*)[3])grad, a->push[0] - a->push[1]);
+    t->push[0] = fmin(warm * t->push[0], limit);
+    t->push[1] = fmin(warm * t->push[1], limit);
+    if (square > 0.0) turn(a, x, (const double(*)[3])grad, t->push[0] - t->push[1]);
 }
 
 /* Volume of a panel's four corners, six times: det[p, r, d] with the posts p and r and d between their feet.
@@ -428,7 +439,7 @@ static void project_panel(const morph_blanket_state *b, int panel, double *x) {
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm) {
     const double most = MOST_CARRIED * b->pull * b->step * b->step;
     for (int t = 0; t < b->near_angles; t++)
-        start_angle(&b->angle[b->near_angle[t]], x, warm, most);
+        start_angle(&b->turn[b->near_angle[t]], &b->angle[b->near_angle[t]], x, warm, most);
     for (int l = 0; l < b->near_links; l++)
         start_length(b, b->near_link[l], x, warm, most);
     morph_blanket_start_contacts(b, x, warm, most);
@@ -441,7 +452,8 @@ static void sweep_complete(morph_blanket_state *b, double *x, bool backward) {
     b->hot_angles = b->hot_links = b->hot_contacts = 0;
     for (int t = 0; t < b->near_angles; t++) {
         const int angle = b->near_angle[backward ? b->near_angles - 1 - t : t];
-        if (project_angle(&b->angle[angle], x, &motion)) b->hot_angle[b->hot_angles++] = angle;
+        if (project_angle(&b->turn[angle], &b->angle[angle], x, &motion))
+            b->hot_angle[b->hot_angles++] = angle;
         note(b, motion);
     }
     for (int l = 0; l < b->near_links; l++) {
@@ -466,9 +478,9 @@ static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
         morph_angle *a = &b->angle[angle];
         double motion;
         if (a->linear)
-            motion = linear_angle(a, x);
+            motion = linear_angle(&b->turn[angle], a, x);
         else
-            project_angle(a, x, &motion);
+            project_angle(&b->turn[angle], a, x, &motion);
         note(b, motion);
         if (fabs(motion) > still) b->hot_angle[backward ? b->hot_angles - 1 - kept++ : kept++] = angle;
     }

@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* How much the boxes are grown, spacings: far pairs cost next to nothing. */
-#define MARGIN 0.25
+#define MARGIN 0.3
 /* Pairs closer than this beyond what a step moves them are listed: what sweeps may add, spacings. */
 #define LISTED 0.05
 /* Aimed at beyond the sum of the radii, spacings, as the other limits aim inside. */
@@ -156,20 +156,20 @@ static bool set_contact(const morph_blanket_state *b, const int pair[2], double 
     return true;
 }
 
-/* Bars come nearer by no more than what their joints have moved otherwise than the blanket as a whole. */
+/* What was left out stood apart along one axis by more than twice the margin: it meets only where two joints
+ * have moved otherwise by as much along an axis. */
 static bool outdated(const morph_blanket_state *b) {
     const morph_blanket_self *c = b->self;
-    const double margin = MARGIN * b->structure->spacing;
-    double mean[3] = {0.0};
     if (!c->known) return true;
-    for (int k = 0; k < 3 * b->joints; k++)
-        mean[k % 3] += (b->before[k] - c->found[k]) / b->joints;
-    for (int j = 0; j < b->joints; j++) {
-        double d[3];
-        for (int k = 0; k < 3; k++)
-            d[k] = b->before[3 * j + k] - c->found[3 * j + k] - mean[k];
-        if (!(morph_norm(d) + b->move[j] < margin)) return true;
-    }
+    double least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int j = 0; j < b->joints; j++)
+        for (int k = 0; k < 3; k++) {
+            const double d = b->before[3 * j + k] - c->found[3 * j + k];
+            if (d - b->move[j] < least[k]) least[k] = d - b->move[j];
+            if (d + b->move[j] > most[k]) most[k] = d + b->move[j];
+        }
+    for (int k = 0; k < 3; k++)
+        if (!(most[k] - least[k] < (2.0 * MARGIN - LISTED) * b->structure->spacing)) return true;
     return false;
 }
 

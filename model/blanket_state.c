@@ -49,6 +49,7 @@ static morph_status allocate(morph_blanket_state *b) {
     if (status == MORPH_OK) status = morph_blanket_self_create(b->structure, &b->self);
     if (status == MORPH_OK) status = morph_blanket_paths_create(b);
     if (status == MORPH_OK) status = morph_blanket_limits_create(b);
+    if (status == MORPH_OK) status = morph_blanket_dampers_create(b);
     if (status == MORPH_OK) status = morph_blanket_touches_create(b);
     return status == MORPH_OK ? morph_blanket_soft_create(b) : status;
 }
@@ -100,7 +101,10 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->touch_wake);
     free(b->span_wake);
     free(b->first_touch);
-    free(b->angle_ends);
+    free(b->angle_far);
+    free(b->turn);
+    free(b->damper);
+    free(b->come);
     free(b->path);
     free(b->move);
     free(b->hot_link);
@@ -111,6 +115,7 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->near_angle);
     free(b->push);
     free(b->angle);
+    morph_blanket_hull_destroy(b->hull);
     morph_blanket_fix_destroy(b->fix);
     morph_blanket_self_destroy(b->self);
     morph_blanket_soft_destroy(b->soft);

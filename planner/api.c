@@ -175,7 +175,7 @@ static int plan_into(const morph_scene *scene, const char *folder, const morph_j
         job->method && strcmp(job->method, "blanket") == 0 ? MORPH_METHOD_BLANKET
         : job->method && strcmp(job->method, "nlopt") == 0 ? MORPH_METHOD_NLOPT
                                                            : MORPH_METHOD_IPOPT,
-        &control, job->warning, NULL};
+        &control, job->warning, NULL, job->budget};
     char message[512] = "";
     morph_status status = morph_folder_probe(folder, job->overwrite, message, sizeof message);
     if (status != MORPH_OK) {

@@ -29,10 +29,13 @@ enum morph_exit {
 /* How a job runs. Any pointer may be NULL. Callbacks come on the caller's thread. */
 typedef struct morph_job {
     const char *folder; /* plan folder; NULL: the scene's path without ending, + ".plan" */
-    const char *method; /* "ipopt" (default) or "blanket" */
+    const char *method; /* "ipopt" (default), "nlopt" or "blanket" */
     const char *motion; /* picture: "schedule" (default), "blanket", "replay", "core", or "cavity" */
+    const char *format; /* export: "csv" (default) */
+    double sample;      /* export: s between rows; 0: the plan's own */
+    double budget;      /* plan: s until the best feasible plan so far is written; 0: none */
     bool overwrite;     /* exchange an existing plan folder; a stopped plan never does: it goes into
-                           FOLDER.stopped */
+                           FOLDER.stopped. export: replace an existing file */
     void (*message)(void *user, const char *line);                    /* faults and warnings, one line each */
     void (*log)(void *user, const char *line);                        /* what the solvers do, one line each */
     void (*progress)(void *user, const char *stage, double fraction); /* fraction of that stage */
@@ -59,6 +62,11 @@ MORPH_API int morph_check_folder(const char *folder, const char *schedule, const
 
 /* Draws a plan folder into file (.svg or .png). */
 MORPH_API int morph_picture_folder(const char *folder, const char *file, const morph_job *job);
+
+/* Exports a plan folder's schedule: the same curve at any step (job->sample), with rates and accelerations.
+ * file: written whole or not at all, an existing one replaced with job->overwrite only; NULL: the text goes
+ * to *text (may be NULL with a file). */
+MORPH_API int morph_export_folder(const char *folder, const char *file, const morph_job *job, char **text);
 
 /* Structure, numbering, mobility and target of a scene; solves nothing. */
 MORPH_API int morph_info_scene(const char *scene, const morph_job *job, char **text);

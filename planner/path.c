@@ -8,13 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FINE = 12 }; /* points examined per interval */
-
 morph_path_options morph_path_defaults(void) {
     return (morph_path_options){.end = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
                                 .interior = {.length = 0.02, .angle = 0.03, .clearance = 0.06, .self = 0.02},
                                 .intervals = 12,
                                 .poses = 64,
+                                .fine = 12,
                                 .sweeps = 1,
                                 .smoothness = 30.0,
                                 .refine = true};
@@ -108,12 +107,27 @@ static morph_inset inset_at(const pather *p, double s, double factor) {
                          e->clearance + f * (i->clearance - e->clearance), e->self + f * (i->self - e->self)};
 }
 
-/* Moves pose k the least from where it stands so that it holds its limits with its inset. */
+/* Solves that may die (each in a process of its own) before the path is given up: whatever killed one has
+ * killed the next by then too. */
+enum { MOST_DEATHS = 3 };
+
+/* Moves pose k the least from where it stands so that it holds its limits with its inset. A solver that dies
+ * leaves the pose as it was: the curve's examination decides whether that matters. */
 static morph_status solve_pose(pather *p, int k) {
     const morph_inset inset = inset_at(p, p->s[k], p->inset[k]);
+    const size_t width = (size_t)p->coordinates;
     morph_violation v;
-    return morph_project(p->world, &inset, 5, p->options->control, p->active, pose(p, k), &v,
-                         &p->report->effort);
+    double *before = morph_alloc(width, sizeof *before);
+    if (!before) return MORPH_ERR_NOMEM;
+    memcpy(before, pose(p, k), width * sizeof *before);
+    morph_status status = morph_project(p->world, &inset, 5, p->options->control, p->active, pose(p, k), &v,
+                                        &p->report->effort);
+    if ((status == MORPH_ERR_BACKEND || status == MORPH_ERR_NOMEM) && ++p->report->deaths <= MOST_DEATHS) {
+        memcpy(pose(p, k), before, width * sizeof *before);
+        status = MORPH_OK;
+    }
+    free(before);
+    return status;
 }
 
 /* Parameter by chord length, so that the spline sees even speed. */
@@ -156,8 +170,8 @@ static morph_status examine_curve(pather *p, const morph_curve *curve, breach *b
         r->violation.amount[l] = -INFINITY;
     for (int k = 0; k + 1 < p->count && status == MORPH_OK; k++) {
         breaches[k] = (breach){.worst = -INFINITY, .s = p->s[k]};
-        for (int f = 0; f <= FINE && status == MORPH_OK; f++) {
-            const double s = p->s[k] + (p->s[k + 1] - p->s[k]) * f / FINE;
+        for (int f = 0; f <= p->options->fine && status == MORPH_OK; f++) {
+            const double s = p->s[k] + (p->s[k + 1] - p->s[k]) * f / p->options->fine;
             morph_violation v;
             morph_curve_joints(curve, s, 0, scratch, x);
             for (int i = 0; i < p->coordinates; i++)
@@ -312,6 +326,7 @@ static morph_status run(pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
     set_parameters(p);
     if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
+    if (!p->options->refine && p->options->smooth) status = smooth_poses(p, p->options->smoothness);
     if (status == MORPH_OK) set_parameters(p);
     double before = INFINITY;
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {

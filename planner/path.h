@@ -20,12 +20,15 @@ typedef struct morph_path_options {
     double smoothness;     /* weight of second differences of poses beside the distance to the guide */
     double seconds;        /* wall; <= 0: none */
     bool refine;           /* false: the guide's poses as they are, nothing solved (the pure blanket) */
+    int fine;              /* points examined per interval */
+    bool smooth;           /* with refine false: smoothed, which takes no solve either */
     const morph_control *control;
 } morph_path_options;
 morph_path_options morph_path_defaults(void);
 
 typedef struct morph_path_report {
     int poses, inserted, rows_possible;
+    int deaths; /* solves of poses that ended without a result: the poses stayed as they were */
     morph_effort effort;
     double seconds;
     bool feasible;              /* on the fine grid, by exact examination */

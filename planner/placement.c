@@ -12,6 +12,7 @@ morph_placement_options morph_placement_defaults(void) {
     /* hold: a joint's friction at the default coefficient, about half its weight, is spent within a twentieth
      * of a spacing; softer springs (2) left rounds at saddles, and were slower. epsilon: a limit a tenth of a
      * spacing away carries a hundredth of a weight. */
+    /* last_reach: what springs say of friction holds while joints hardly move. */
     return (morph_placement_options){.evaluations = 60,
                                      .cover_weight = MORPH_COVER_WEIGHT,
                                      .slide = 0.1,
@@ -21,8 +22,7 @@ morph_placement_options morph_placement_defaults(void) {
                                      .strongest = 60.0,
                                      .thrift = 1e-7,
                                      .hold = 10.0,
-                                     .last_hold = 100.0,
-                                     .last_reach = 0.1,
+                                     .last_reach = 0.02,
                                      .epsilon = 1e-3,
                                      .last_epsilon = 1e-7,
                                      .rounds = 8,
@@ -264,7 +264,7 @@ static morph_status conclude(placer *p) {
     double *z = NULL;
     trial t = {0};
     morph_status status =
-        adopt(p, out->centre, out->centres, p->options->last_epsilon, p->options->last_hold, &b, &rest);
+        adopt(p, out->centre, out->centres, p->options->last_epsilon, p->options->hold, &b, &rest);
     if (status == MORPH_OK)
         status = proposal_of(p->options)(p->w, b, p->options, p->options->last_reach, time_left(p), &rest, &z,
                                          &result);

@@ -21,17 +21,17 @@ typedef enum morph_placement_method {
 
 typedef struct morph_placement_options {
     morph_placement_method method;
-    int evaluations;              /* searches: shapes at rest in one round at most */
-    double cover_weight, slide;   /* of the objective, as in morph_refine_options */
-    double reach;                 /* how far joints may move in one round, spacings; centres twice as far */
-    double least_gain;            /* a round that gains less than this part is the last with these centres */
-    double least_growth;          /* a further centre that gains less than this part is not kept */
-    double strongest;             /* of a centre, unit times spacing^2 */
-    double thrift;                /* weight of the strengths' squares */
-    double hold;                  /* of friction that a move would meet, units per spacing */
-    double last_hold, last_reach; /* and in the last solve, where what lies still stays */
-    double epsilon;               /* of complementarity in the rounds, unit times spacing */
-    double last_epsilon;          /* and in the last solve */
+    int evaluations;            /* searches: shapes at rest in one round at most */
+    double cover_weight, slide; /* of the objective, as in morph_refine_options */
+    double reach;               /* how far joints may move in one round, spacings; centres twice as far */
+    double least_gain;          /* a round that gains less than this part is the last with these centres */
+    double least_growth;        /* a further centre that gains less than this part is not kept */
+    double strongest;           /* of a centre, unit times spacing^2 */
+    double thrift;              /* weight of the strengths' squares */
+    double hold;                /* of friction that a move would meet, units per spacing */
+    double last_reach;          /* and in the last solve, which is to say what the blanket does */
+    double epsilon;             /* of complementarity in the rounds, unit times spacing */
+    double last_epsilon;        /* and in the last solve */
     int rounds, most_centres;
     double seconds; /* wall, looked at between solves; <= 0: none */
     const morph_control *control;

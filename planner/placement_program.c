@@ -47,6 +47,7 @@ typedef struct program {
     morph_balance *balance;
     const morph_placement_options *options;
     double *lower, *upper;
+    double epsilon; /* of the last solve */
     morph_cavity_objective objective;
     morph_control quiet; /* the caller's without its log: the program's iterations are too many lines */
 } program;
@@ -107,7 +108,9 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
         o.mu_init = fmin(FIRST_MU, b->epsilon);
         /* A round that wants more goes on in the next; a harder contact starts from the end of a softer one.
          */
-        o.max_iterations = b->epsilon < p->options->epsilon ? 40 : 60;
+        o.max_iterations = b->epsilon >= p->options->epsilon ? 60
+                           : b->epsilon > 1.001 * p->epsilon ? 40
+                                                             : 120;
         o.control = &p->quiet;
         status = morph_nlp_solve(nlp, NULL, &o, result);
     }
@@ -141,6 +144,7 @@ morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
     }
     morph_status status = morph_cavity_objective_create(w, options, rest->z, b->centres,
                                                         morph_balance_strength(b), &p.objective);
+    p.epsilon = b->epsilon;
     const double epsilon = b->epsilon, soft = fmax(epsilon, options->epsilon);
     b->epsilon = soft;
     for (int added = 1, pass = 0; added > 0 && pass < PASSES && status == MORPH_OK; pass++) {

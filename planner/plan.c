@@ -9,7 +9,7 @@
 
 /* After a stop the stages go on with what there is. */
 const morph_control *morph_planner_control(const morph_planner *p) {
-    return p->stopped ? &p->quiet : p->options->control;
+    return p->stopped ? &p->quiet : &p->timed;
 }
 
 void morph_planner_time(morph_planner *p, morph_stage stage, double since) {
@@ -124,6 +124,7 @@ static morph_status stage_replay(morph_planner *p) {
     morph_summary *s = &p->plan->summary;
     morph_record *r = &p->plan->record;
     if (p->stopped) return MORPH_OK;
+    morph_planner_limit(p, MORPH_STAGE_REPLAY);
     if (s->duration > LONGEST_REPLAY) {
         morph_log(morph_planner_control(p), "replay: left out, a schedule of %.0f s is too long",
                   s->duration);
@@ -149,10 +150,8 @@ static morph_status stage_replay(morph_planner *p) {
         else if (status == MORPH_OK)
             morph_record_replay(&t, &r->replay_frames, &r->replay_time, &r->replay_joints);
     }
-    if (status == MORPH_ERR_STOPPED) {
-        p->stopped = true;
-        status = MORPH_OK;
-    }
+    status = morph_planner_ended(p, status, MORPH_STAGE_REPLAY);
+    p->deadline = INFINITY;
     /* A schedule that throws the structure about until no number is left is a finding, not our failure. */
     if (status == MORPH_ERR_NONFINITE) {
         morph_log(morph_planner_control(p), "replay: the lengths throw the structure about without bound");
@@ -177,6 +176,7 @@ static void say_missed(morph_planner *p) {
 static morph_status stage_check(morph_planner *p) {
     const double since = morph_seconds();
     morph_summary *s = &p->plan->summary;
+    p->deadline = INFINITY;
     morph_progress(morph_planner_control(p), "check", 0.0);
     const morph_status status = morph_check_record(&p->plan->record, &p->quiet, &s->check);
     morph_planner_time(p, MORPH_STAGE_CHECK, since);
@@ -192,13 +192,21 @@ static morph_status stage_check(morph_planner *p) {
                  morph_margin_name(s->check.worst), m->element, m->time, -m->worst,
                  morph_margin_unit(s->check.worst), morph_check_hint(&s->check));
     }
-    const morph_outcome outcome = p->stopped     ? MORPH_STOPPED
-                                  : !s->feasible ? MORPH_INFEASIBLE
-                                  : p->optimal   ? MORPH_OPTIMAL
-                                                 : MORPH_FEASIBLE;
+    return MORPH_OK;
+}
+
+/* A budget that ran out is no fault where the plan holds. */
+static void conclude(morph_planner *p) {
+    morph_summary *s = &p->plan->summary;
+    const morph_outcome outcome = p->stopped || (p->late && !s->feasible) ? MORPH_STOPPED
+                                  : !s->feasible                          ? MORPH_INFEASIBLE
+                                  : p->optimal                            ? MORPH_OPTIMAL
+                                                                          : MORPH_FEASIBLE;
+    s->budget_ran_out = p->late;
+    if ((p->late || p->lost || p->stopped) && s->warning[0] && p->options->warn)
+        p->options->warn(p->options->control ? p->options->control->user : NULL, s->warning);
     snprintf(s->outcome, sizeof s->outcome, "%s", morph_outcome_text(outcome));
     snprintf(p->plan->record.outcome, sizeof p->plan->record.outcome, "%s", s->outcome);
-    return MORPH_OK;
 }
 
 static void describe(morph_planner *p) {
@@ -218,15 +226,70 @@ static void describe(morph_planner *p) {
     memcpy(r->scene_sha256, p->scene->sha256, sizeof r->scene_sha256);
 }
 
-static morph_status run_stages(morph_planner *p) {
-    static morph_status (*const stages[])(morph_planner *) = {
-        stage_target,       morph_stage_nominal, morph_stage_placement, morph_stage_refine, morph_stage_path,
-        morph_stage_timing, stage_measure,       stage_replay,          stage_check};
+typedef morph_status stage_call(morph_planner *);
+
+static morph_status run_in_turn(morph_planner *p, stage_call *const *stages, size_t count) {
     morph_status status = MORPH_OK;
-    for (size_t k = 0; k < sizeof stages / sizeof *stages && status == MORPH_OK; k++) {
+    for (size_t k = 0; k < count && status == MORPH_OK; k++) {
         status = stages[k](p);
+        p->deadline = INFINITY;
         if (status == MORPH_OK && morph_stopped(p->options->control)) p->stopped = true;
     }
+    return status;
+}
+
+#define RUN(p, stages) run_in_turn(p, stages, sizeof(stages) / sizeof *(stages))
+
+/* With a budget: from where the blanket ends, moved inside its limits, by the first path to a plan that
+ * stands until there is a better one, and that tells what a plan takes. The end and the blanket stay as they
+ * are for the stages that come. */
+static morph_status make_draft(morph_planner *p) {
+    static stage_call *const to_path[] = {morph_stage_project, morph_stage_path};
+    static stage_call *const from_path[] = {morph_stage_timing, stage_measure, stage_check};
+    if (!(p->options->budget > 0.0) || p->options->method != MORPH_METHOD_IPOPT || p->stopped)
+        return MORPH_OK;
+    const size_t bytes = 3 * (size_t)p->work.structure->joints * sizeof(double);
+    const int frames = p->nominal.frames;
+    double *end = morph_alloc(bytes, 1);
+    if (!end) return MORPH_ERR_NOMEM;
+    memcpy(end, p->end, bytes);
+    const double before = p->plan->summary.seconds[MORPH_STAGE_PATH];
+    const bool late = p->late;
+    char warning[sizeof p->plan->summary.warning];
+    memcpy(warning, p->plan->summary.warning, sizeof warning);
+    p->late = false;
+    p->plan->summary.warning[0] = '\0';
+    morph_status status = RUN(p, to_path);
+    const double path = p->plan->summary.seconds[MORPH_STAGE_PATH] - before, since = morph_seconds();
+    if (status == MORPH_OK) status = RUN(p, from_path);
+    if (status == MORPH_OK)
+        morph_planner_keep_draft(p, path,
+                                 morph_seconds() - since + morph_planner_write_seconds(&p->plan->record));
+    memcpy(p->end, end, bytes);
+    memcpy(p->plan->summary.warning, warning, sizeof warning);
+    p->late = late;
+    p->nominal.frames = frames;
+    free(end);
+    return status;
+}
+
+static morph_status run_stages(morph_planner *p) {
+    static stage_call *const first[] = {stage_target, morph_stage_nominal};
+    static stage_call *const second[] = {morph_stage_placement, morph_stage_refine, morph_stage_path,
+                                         morph_stage_timing,    stage_measure,      stage_check};
+    morph_status status = RUN(p, first);
+    if (status == MORPH_OK) status = make_draft(p);
+    if (status != MORPH_OK) return status;
+    if (!p->draft.there || morph_planner_has_time(p)) {
+        status = RUN(p, second);
+    } else if (!p->stopped) {
+        p->late = true;
+        morph_planner_warn(p, "the budget of %g s left no time for a better plan", p->options->budget);
+    }
+    morph_planner_choose(p, &status);
+    if (status == MORPH_OK) status = stage_replay(p);
+    if (status == MORPH_OK && morph_stopped(p->options->control)) p->stopped = true;
+    if (status == MORPH_OK) conclude(p);
     return status;
 }
 
@@ -235,14 +298,15 @@ morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *
     const double since = morph_seconds();
     /* One BLAS thread: sums then repeat bit for bit. */
     morph_blas_threads(1);
-    morph_planner p = {.scene = scene, .options = options};
+    morph_planner p = {.scene = scene, .options = options, .started = since};
     p.way = &p.nominal;
-    if (options->control) p.quiet = *options->control;
-    p.quiet.stop = NULL;
+    morph_planner_listen(&p);
     p.plan = calloc(1, sizeof *p.plan);
     if (!p.plan) return MORPH_ERR_NOMEM;
     describe(&p);
+    p.plan->summary.budget = options->budget;
     const morph_status status = run_stages(&p);
+    morph_record_free(&p.draft.record);
     morph_timing_free(&p.timing);
     morph_curve_destroy(p.curve);
     morph_refine_report_free(&p.refined);

@@ -20,6 +20,7 @@ typedef struct morph_plan_options {
                  const char *line); /* the reach check's findings, with the control's user; NULL */
     /* Centres that were placed for this scene already, with their run; NULL: the plan places its own. */
     const struct morph_placement *placement;
+    double budget; /* s for the plan and its writing; 0: none. A feasible plan is sought first, then better */
 } morph_plan_options;
 
 typedef struct morph_plan {

@@ -94,16 +94,14 @@ morph_status morph_stage_nominal(morph_planner *p) {
     const double since = morph_seconds();
     const morph_blanket_def def = morph_scene_blanket(p->scene, p->work.structure);
     morph_summary *s = &p->plan->summary;
+    morph_planner_limit(p, MORPH_STAGE_NOMINAL);
     morph_status status =
         p->scene->target_def.has_deformable
             ? run_deformable(p, def)
             : morph_blanket_run(p->work.structure, p->work.sdf, p->work.exact, &def, p->work.start,
                                 morph_planner_control(p), &p->nominal, &s->blanket_report);
     const morph_structure *st = p->work.structure;
-    if (status == MORPH_ERR_STOPPED && p->nominal.frames > 0) {
-        p->stopped = true;
-        status = MORPH_OK;
-    }
+    if (p->nominal.frames > 0) status = morph_planner_ended(p, status, MORPH_STAGE_NOMINAL);
     if (status == MORPH_OK) status = morph_record_nominal(&p->plan->record, st, &p->nominal);
     if (status == MORPH_OK) {
         const size_t width = 3 * (size_t)st->joints;

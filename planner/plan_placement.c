@@ -79,14 +79,13 @@ morph_status morph_stage_placement(morph_planner *p) {
         morph_placement_options o = morph_placement_defaults();
         o.control = morph_planner_control(p);
         if (p->options->method == MORPH_METHOD_NLOPT) o.method = MORPH_PLACE_NLOPT_GRADIENT;
+        morph_planner_limit(p, MORPH_STAGE_PLACEMENT);
         morph_progress(o.control, "placement", 0.0);
         status = morph_placement_run(&p->work, p->scene, p->end, &o, &own);
         placed = &own;
     }
-    if (status == MORPH_ERR_STOPPED) {
-        p->stopped = true;
-        status = MORPH_OK;
-    } else if (status == MORPH_ERR_NONFINITE || status == MORPH_ERR_BACKEND) {
+    status = morph_planner_ended(p, status, MORPH_STAGE_PLACEMENT);
+    if (status == MORPH_ERR_NONFINITE || status == MORPH_ERR_BACKEND) {
         morph_log(morph_planner_control(p), "placement: left out: %s", morph_status_text(status));
         status = MORPH_OK;
     }

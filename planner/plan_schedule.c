@@ -34,16 +34,16 @@ static morph_status cut_tangle(morph_planner *p) {
     return status;
 }
 
-/* Refines p->end into *report. */
-static morph_status refine(morph_planner *p, morph_refine_report *report) {
+/* Refines p->end into *report; rounds 0 only moves it inside its limits. */
+static morph_status refine(morph_planner *p, int rounds, morph_refine_report *report) {
     morph_refine_options o = morph_refine_defaults();
     o.control = morph_planner_control(p);
-    o.goal = p->scene->goal;
+    if (rounds > 0) o.goal = p->scene->goal;
+    o.rounds = rounds;
     morph_status status = morph_refine(&p->work.world, &o, p->end, report);
-    if (status == MORPH_ERR_STOPPED) {
-        p->stopped = true;
-        status = MORPH_OK;
-    }
+    status = morph_planner_ended(p, status, MORPH_STAGE_REFINE);
+    status = morph_planner_survive(p, report->deaths > 0 && status == MORPH_OK ? MORPH_ERR_BACKEND : status,
+                                   MORPH_STAGE_REFINE);
     morph_summary *s = &p->plan->summary;
     s->iterations_refine += report->effort.iterations;
     s->linear_seconds += report->effort.linear_seconds;
@@ -63,7 +63,7 @@ static morph_status refine_nominal(morph_planner *p) {
               "refine: the goal is missed from the guided blanket's end: from the pure one's");
     morph_refine_report other = {0};
     morph_status status = cut_tangle(p);
-    if (status == MORPH_OK) status = refine(p, &other);
+    if (status == MORPH_OK) status = refine(p, morph_refine_defaults().rounds, &other);
     if (status == MORPH_OK && other.feasible && other.miss < p->refined.miss) {
         const morph_refine_report worse = p->refined;
         p->refined = other;
@@ -77,28 +77,48 @@ static morph_status refine_nominal(morph_planner *p) {
     return status;
 }
 
-morph_status morph_stage_refine(morph_planner *p) {
-    if (p->options->method != MORPH_METHOD_IPOPT || p->stopped) return MORPH_OK;
-    const double since = morph_seconds();
-    morph_status status = p->guided ? MORPH_OK : cut_tangle(p);
-    if (status == MORPH_OK) status = refine(p, &p->refined);
-    if (status == MORPH_OK && p->guided && p->refined.miss > 0.0 && !p->stopped) status = refine_nominal(p);
+static void note_refined(morph_planner *p, double since) {
     morph_summary *s = &p->plan->summary;
     s->unknowns_refine = p->refined.effort.unknowns;
     s->rows_refine_used = p->refined.effort.rows;
     s->rows_refine_possible = p->refined.rows_possible;
-    p->optimal = p->refined.last == MORPH_OPTIMAL;
+    p->optimal = p->refined.last == MORPH_OPTIMAL && p->refined.rounds > 0 && !p->lost && !p->late;
     morph_planner_time(p, MORPH_STAGE_REFINE, since);
+}
+
+morph_status morph_stage_refine(morph_planner *p) {
+    if (p->options->method != MORPH_METHOD_IPOPT) return MORPH_OK;
+    if (p->stopped) return morph_stage_project(p);
+    const double since = morph_seconds();
+    const int rounds = morph_refine_defaults().rounds;
+    morph_planner_limit(p, MORPH_STAGE_REFINE);
+    morph_status status = p->guided ? MORPH_OK : cut_tangle(p);
+    if (status == MORPH_OK) status = refine(p, rounds, &p->refined);
+    if (status == MORPH_OK && p->guided && p->refined.miss > 0.0 && !p->stopped && !p->late)
+        status = refine_nominal(p);
+    note_refined(p, since);
+    return status;
+}
+
+/* The frames on the way are nothing to it: none are cut. */
+morph_status morph_stage_project(morph_planner *p) {
+    const double since = morph_seconds();
+    morph_planner_limit(p, MORPH_STAGE_REFINE);
+    const morph_status status = refine(p, 0, &p->refined);
+    note_refined(p, since);
     return status;
 }
 
 /* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
-static morph_status try_path(morph_planner *p, bool unfold, bool stations, int intervals, double *least) {
+static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool stations, int intervals,
+                             double *least) {
     morph_path_options o = morph_path_defaults();
     o.control = morph_planner_control(p);
-    o.refine = p->options->method == MORPH_METHOD_IPOPT && !p->stopped;
+    o.refine = solve;
+    if (!solve && p->options->method == MORPH_METHOD_IPOPT) o.fine = 2; /* only to choose what to trim */
+    o.smooth = p->options->method == MORPH_METHOD_IPOPT;
     o.unfold = unfold;
-    if (stations) {
+    if (stations && p->refined.stations > 0) {
         o.stations = p->refined.stations;
         o.station = p->refined.station;
         o.smoothness = 1.0; /* the stations are small steps already: little smoothing keeps them inside */
@@ -113,6 +133,7 @@ static morph_status try_path(morph_planner *p, bool unfold, bool stations, int i
     s->linear_seconds += r.effort.linear_seconds;
     s->callback_seconds += r.effort.callback_seconds;
     const double worst = morph_violation_worst(&r.violation, morph_pose_tolerance, NULL);
+    if (r.deaths > 0) morph_planner_survive(p, MORPH_ERR_BACKEND, MORPH_STAGE_PATH);
     if (status == MORPH_OK && curve && (!p->curve || worst < *least)) {
         morph_curve_destroy(p->curve);
         p->curve = curve;
@@ -126,27 +147,70 @@ static morph_status try_path(morph_planner *p, bool unfold, bool stations, int i
     return status;
 }
 
+/* Poses without a solve, the quickest that there is. The pure blanket's way is that of its own. */
+static morph_status plain_path(morph_planner *p, double *least) {
+    p->deadline = INFINITY;
+    morph_status status = try_path(p, false, false, false, 24, least);
+    if (status == MORPH_OK && p->refined.stations > 0 && *least > 1.0)
+        status = try_path(p, false, false, true, 24, least);
+    return status;
+}
+
+/* The beginning that holds of the path in hand, where no better one could be had. */
+static morph_status trim_path(morph_planner *p) {
+    morph_curve *piece;
+    double kept;
+    p->deadline = INFINITY;
+    const morph_status status = morph_planner_trim(p, p->curve, &piece, &kept);
+    if (status != MORPH_OK || !piece) return status;
+    if (kept >= 1.0) { /* all of it holds as it is */
+        morph_curve_destroy(piece);
+        return MORPH_OK;
+    }
+    morph_curve_destroy(p->curve);
+    p->curve = piece;
+    p->optimal = false;
+    morph_planner_warn(p, "the path ends after %.1f %% of its way: beyond, it broke a limit", 100.0 * kept);
+    return MORPH_OK;
+}
+
 /* First stepped back from the end; then along the blanket's own way and the poses that the refinement went
- * through; last stepped back in more poses: the first that holds is taken. The pure blanket, and what is left
- * after a stop, get their poses without a solve. */
+ * through; last stepped back in more poses: the first that holds is taken. The pure blanket gets its poses
+ * without a solve. So does what is left of a path that was cut short, by a stop, a budget or a solver's
+ * death: of that, what holds is kept. */
 morph_status morph_stage_path(morph_planner *p) {
     static const struct {
         bool unfold, stations;
         int intervals;
     } ways[] = {{true, false, 12}, {false, true, 24}, {true, false, 24}};
     const double since = morph_seconds();
+    const bool solve = p->options->method == MORPH_METHOD_IPOPT;
     double least = INFINITY;
     morph_status status = MORPH_OK;
-    for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK; k++) {
-        if (p->options->method != MORPH_METHOD_IPOPT || p->stopped) break;
-        status = try_path(p, ways[k].unfold, ways[k].stations, ways[k].intervals, &least);
-        if (status == MORPH_ERR_STOPPED || morph_stopped(p->options->control)) {
-            p->stopped = true;
-            status = MORPH_OK;
-        }
+    bool cut = p->stopped || morph_planner_drafts(p);
+    morph_planner_limit(p, MORPH_STAGE_PATH);
+    for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK && solve;) {
+        const bool before = p->stopped;
+        status = try_path(p, true, ways[k].unfold, ways[k].stations, ways[k].intervals, &least);
+        cut = cut || status != MORPH_OK;
+        status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
+        status = morph_planner_survive(p, status, MORPH_STAGE_PATH);
         if (p->curve && least <= 1.0) break;
+        cut = cut || p->stopped || p->lost || morph_seconds() > p->deadline;
+        if (!before && p->stopped) {
+            morph_planner_limit(p, MORPH_STAGE_PATH); /* the same way again, in the time that a stop leaves */
+            continue;
+        }
+        /* After a stop, without time, or for a draft one way is all there is. */
+        if (p->stopped || morph_planner_drafts(p) || morph_seconds() > p->deadline) break;
+        k++;
     }
-    if (status == MORPH_OK && !p->curve) status = try_path(p, false, false, 24, &least);
+    /* With a plan in hand nothing is patched up for want of time. */
+    if (status == MORPH_OK && !p->curve && !p->stopped && p->draft.there && p->draft.summary.feasible)
+        status = MORPH_ERR_STOPPED;
+    const bool plain = !p->curve || (solve && cut && least > 1.0 && !p->draft.there);
+    if (status == MORPH_OK && plain) status = plain_path(p, &least);
+    if (status == MORPH_OK && solve && cut && (plain || least > 1.0)) status = trim_path(p);
     morph_planner_time(p, MORPH_STAGE_PATH, since);
     return status;
 }
@@ -167,6 +231,7 @@ static double sample_step(morph_planner *p) {
 
 morph_status morph_stage_timing(morph_planner *p) {
     const double since = morph_seconds();
+    morph_planner_limit(p, MORPH_STAGE_TIMING);
     const morph_timing_options o = {p->scene->duration, p->scene->sample, morph_planner_control(p)};
     morph_timing_report r;
     morph_progress(o.control, "timing", 0.0);

@@ -53,6 +53,7 @@ static morph_status solve(projector *p, double *x) {
     morph_nlp_options o = morph_nlp_defaults();
     o.tolerance = 1e-5; /* of an objective in spacings^2: moves no joint by a hundredth of a link's radius */
     o.max_iterations = 80;
+    o.isolated = true;
     o.control = &p->quiet;
     status = morph_nlp_solve(nlp, x, &o, &result);
     morph_nlp_destroy(nlp);

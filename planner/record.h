@@ -53,6 +53,10 @@ typedef struct morph_record {
     /* path/ */
     int poses, pose_width;       /* 6*posts, or 3*joints without posts */
     double *path_s, *path_poses; /* poses; poses x pose_width (centre and direction per post) */
+    /* timing/: s(tau), tau = time / duration, as a quintic spline; with path/ it gives the schedule exactly
+     */
+    int timing_knots, timing_controls;
+    double *timing_knot, *timing_control, *timing_duration; /* the last is one number, s */
     /* schedule/ */
     int samples;
     double *time, *schedule_joints, *length, *rate, *acceleration;

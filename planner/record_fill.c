@@ -97,11 +97,14 @@ morph_status morph_record_guided(morph_record *r, const morph_structure *s, cons
 morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, const morph_timing *timing,
                                    double sample) {
     const morph_structure *s = curve->structure;
+    const int controls = timing->basis.count;
     const size_t width = 3 * (size_t)s->joints, links = (size_t)s->links;
     const int samples = (int)lround(timing->duration / sample) + 1;
     r->poses = curve->poses;
     r->pose_width = morph_pose_width(s);
     r->samples = samples;
+    r->timing_controls = controls;
+    r->timing_knots = controls + MORPH_SPLINE_ORDER;
     r->time = morph_alloc((size_t)samples, sizeof(double));
     r->schedule_joints = morph_alloc((size_t)samples, width * sizeof(double));
     r->length = morph_alloc((size_t)samples, links * sizeof(double));
@@ -113,8 +116,11 @@ morph_status morph_record_schedule(morph_record *r, const morph_curve *curve, co
     double *by_s = morph_alloc(4 * links, sizeof(double)), *by_t = morph_alloc(4 * links, sizeof(double));
     const bool ok = COPY(r->path_s, curve->s, curve->poses) &&
                     COPY(r->path_poses, curve->pose, (size_t)curve->poses * (size_t)r->pose_width) &&
-                    r->time && r->schedule_joints && r->length && r->rate && r->acceleration &&
-                    r->offset_schedule && scratch && joints && by_s && by_t;
+                    COPY(r->timing_knot, timing->basis.knot, r->timing_knots) &&
+                    COPY(r->timing_control, timing->control, controls) &&
+                    COPY(r->timing_duration, &timing->duration, 1) && r->time && r->schedule_joints &&
+                    r->length && r->rate && r->acceleration && r->offset_schedule && scratch && joints &&
+                    by_s && by_t;
     for (int i = 0; i < samples && ok; i++) {
         double at[4];
         /* Even times as products: a running sum would drift. */

@@ -198,6 +198,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
      * row by a hundredth is wanted rather than the start. */
     o.violation_tolerance = 1e-2;
 
+    o.isolated = true;
     o.control = &r->quiet;
     if (r->options->seconds > 0.0)
         o.max_seconds = fmax(0.1, r->options->seconds - (morph_seconds() - r->started));
@@ -273,8 +274,15 @@ static morph_status improve(refiner *r, int round, double *objective) {
         morph_nlp_result_free(&result);
         return status;
     }
-    status = morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
-                           &r->report->effort);
+    /* A solve that was cut short is not worth moving inside the limits: the best so far is. */
+    status = morph_stopped(r->options->control)
+                 ? MORPH_ERR_STOPPED
+                 : morph_project(r->world, &r->options->inset, 4, r->options->control, r->active, r->x, &v,
+                                 &r->report->effort);
+    if (status == MORPH_ERR_STOPPED) {
+        morph_nlp_result_free(&result);
+        return status;
+    }
     bool through = false;
     *objective = INFINITY;
     if (status == MORPH_OK && r->best_feasible) status = passes_through(r, r->x, &through);
@@ -302,13 +310,18 @@ static bool press_on(refiner *r, int *small_gains) {
     return true;
 }
 
+/* A solver that dies (it runs in a process of its own) ends its round, not the refinement. */
+static bool died(morph_status status) {
+    return status == MORPH_ERR_BACKEND || status == MORPH_ERR_NOMEM;
+}
+
 /* Up to `most` rounds from the best so far, until they gain little. */
 static morph_status run_rounds(refiner *r, int most) {
     const morph_refine_options *o = r->options;
     const size_t bytes = 3 * (size_t)r->world->structure->joints * sizeof *r->x;
     morph_status status = MORPH_OK;
     double objective;
-    int small_gains = 0;
+    int small_gains = 0, deaths = 0;
     r->reach = o->reach;
     for (int n = 0; n < most && status == MORPH_OK; n++) {
         if ((small_gains >= 2 || !(r->reach > o->least_reach)) && !press_on(r, &small_gains)) break;
@@ -316,6 +329,11 @@ static morph_status run_rounds(refiner *r, int most) {
         const double before = missed ? r->best_miss : r->best_objective;
         status = improve(r, r->report->rounds, &objective);
         r->report->rounds++;
+        deaths = died(status) ? deaths + 1 : 0;
+        if (died(status)) {
+            r->report->deaths++;
+            if (deaths < 2) status = MORPH_OK;
+        }
         const double after = missed ? r->best_miss : r->best_objective;
         const double gain = was_feasible ? before - after : r->best_feasible ? before : 0.0;
         /* Trust region: a round that did not help was too bold. */
@@ -363,6 +381,11 @@ static morph_status rounds(refiner *r) {
     if (first != MORPH_OK) return first;
     morph_status status =
         morph_project(r->world, &o->inset, 8, o->control, r->active, r->x, &v, &r->report->effort);
+    if (died(status)) {
+        r->report->deaths++;
+        memcpy(r->x, r->best, 3 * (size_t)r->world->structure->joints * sizeof *r->x);
+        status = MORPH_OK;
+    }
     if (status == MORPH_OK) status = consider(r, r->x, &v, &objective);
     r->share = 1.0;
     if (status == MORPH_OK) status = run_rounds(r, o->rounds);

@@ -25,6 +25,8 @@ morph_refine_options morph_refine_defaults(void);
 
 typedef struct morph_refine_report {
     int rounds, rows_possible;
+    int deaths; /* solves that ended without a result (MORPH_ERR_BACKEND, MORPH_ERR_NOMEM): the best before is
+                   kept, and the second in a row ends the rounds */
     morph_effort effort; /* of all solves */
     double seconds;
     bool feasible;             /* by the exact examination of the returned pose, inset not counted */

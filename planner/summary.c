@@ -209,6 +209,11 @@ static void put_placement(builder *b, cJSON *root, const morph_summary *s) {
 }
 
 static void put_seconds(builder *b, cJSON *root, const morph_summary *s) {
+    if (s->budget > 0.0) {
+        cJSON *budget = put_object(b, root, "budget");
+        put_number(b, budget, "seconds", s->budget);
+        put_bool(b, budget, "ran_out", s->budget_ran_out);
+    }
     cJSON *seconds = put_object(b, root, "seconds");
     for (int k = 0; k < MORPH_STAGES; k++)
         put_number(b, seconds, morph_stage_name((morph_stage)k), s->seconds[k]);

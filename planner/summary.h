@@ -72,6 +72,8 @@ typedef struct morph_summary {
     double linear_seconds, callback_seconds;
     double seconds[MORPH_STAGES];
     double total_seconds;
+    double budget;       /* s; 0: none */
+    bool budget_ran_out; /* something was cut short by it */
     long peak_memory_bytes;
     morph_blanket_report blanket_report;
     /* Largest second difference of a link's length over the blanket's frames, m per frame^2: jumps show. */

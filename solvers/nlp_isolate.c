@@ -52,9 +52,12 @@ static void child_log(void *user, const char *line) {
     send(user, &m);
 }
 
-static _Noreturn void child(morph_nlp *nlp, const morph_nlp_options *options, morph_run *run, int pipe) {
-    /* Never outlives the parent; an interrupt from the terminal is the parent's to decide. */
+static _Noreturn void child(morph_nlp *nlp, const morph_nlp_options *options, morph_run *run, int pipe,
+                            pid_t parent) {
+    /* Never outlives the parent, not even one that died before it could be said; an interrupt from the
+     * terminal is the parent's to decide. */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(1);
     signal(SIGINT, SIG_IGN);
     /* The Fortran runtime prints where it likes. */
     const int null = open("/dev/null", O_WRONLY);
@@ -117,11 +120,11 @@ void morph_run_isolated(morph_nlp *nlp, const morph_nlp_options *options, morph_
     shared->status = MORPH_ERR_NOMEM;
     if (pipe(ends) != 0) return;
     if (fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) goto closed;
-    const pid_t pid = fork();
+    const pid_t parent = getpid(), pid = fork();
     if (pid < 0) goto closed;
     if (pid == 0) {
         close(ends[0]);
-        child(nlp, options, shared, ends[1]);
+        child(nlp, options, shared, ends[1], parent);
     }
     close(ends[1]);
     const bool killed = attend(pid, ends[0], options, shared);

@@ -22,13 +22,18 @@ static const char usage_text[] =
     "                                     core: the replay with the target as a solid core; or cavity: "
     "the\n"
     "                                     cavities under the blanket and under the plan\n"
+    "  export DIR --format csv [-o FILE]  lengths, rates and accelerations over time (default: on stdout)\n"
+    "          [--sample S] [--overwrite] the same curve every S seconds (default: as planned); replace "
+    "FILE\n"
     "  compare SCENE... [-o DIR]          blanket, plan and reference side by side: a table, and DIR "
     "(default: compare)\n"
     "                                     with compare.json and compare.html\n"
     "  info SCENE                         structure with link numbers, mobility, target; solves nothing\n"
     "\n"
     "options of plan:\n"
-    "  --method ipopt|blanket             refined plan (default), or the pure blanket as it fell\n"
+    "  --method ipopt|nlopt|blanket       refined plan (default); the blanket under the centres that NLopt\n"
+    "                                     places, as it fell; the pure blanket, as it fell\n"
+    "  --budget SECONDS                   the best feasible plan that this time allows\n"
     "  --overwrite                        exchange an existing plan folder (interrupted: that stays, the "
     "best "
     "so far\n"
@@ -52,17 +57,13 @@ static void on_signal(int number) {
     signal(number, SIG_DFL);
 }
 
-static int ask_stop(void *user) {
-    (void)user;
-    return interrupted != 0;
-}
-
 typedef struct screen {
     bool terminal, quiet, verbose;
     double started;
     char stage[32];
     int percent;
-    bool bar; /* a bar stands on the line */
+    bool bar;  /* a bar stands on the line */
+    bool told; /* that it is stopping */
 } screen;
 
 static double now(void) {
@@ -79,6 +80,15 @@ static void clear_bar(screen *s) {
 static void on_message(void *user, const char *line) {
     clear_bar(user);
     fprintf(stderr, "%s\n", line);
+}
+
+/* What a second signal would do is said once, when the first is heard. */
+static int ask_stop(void *user) {
+    screen *s = user;
+    if (!interrupted) return 0;
+    if (!s->told && !s->quiet) on_message(s, "stopping with the best so far; a second time ends at once");
+    s->told = true;
+    return 1;
 }
 
 static void on_log(void *user, const char *line) {
@@ -126,10 +136,11 @@ static int not_yet(const char *what) {
     return MORPH_EXIT_INPUT;
 }
 
-static bool positive_number(const char *text) {
+/* The number above 0 that a text is, else 0. */
+static double positive_number(const char *text) {
     char *end;
     const double v = strtod(text, &end);
-    return end != text && *end == '\0' && v > 0.0 && v < 1e300;
+    return end != text && *end == '\0' && v > 0.0 && v < 1e300 ? v : 0.0;
 }
 
 /* Results are worth nothing if they did not arrive: a full disk behind a redirected stdout is an error. */
@@ -153,14 +164,18 @@ enum {
     O_THREADS,
     O_SCHEDULE,
     O_OF,
+    O_FORMAT,
+    O_SAMPLE,
+    O_AXES,
     O_HELP,
     O_VERSION
 };
 
 typedef struct arguments {
-    const char *output, *method, *schedule, *motion, *subject;
+    const char *output, *method, *schedule, *motion, *format, *subject;
     const char *const *subjects; /* of compare; subject is the first */
     int subject_count;
+    double budget, sample; /* s; 0: not given */
     bool overwrite, json, quiet, verbose;
 } arguments;
 
@@ -173,7 +188,7 @@ static int take_option(int option, const char *value, arguments *a) {
     case O_METHOD:
         a->method = value;
         if (strcmp(value, "ipopt") != 0 && strcmp(value, "nlopt") != 0 && strcmp(value, "blanket") != 0)
-            return usage_fault("--method", value, "ipopt, blanket");
+            return usage_fault("--method", value, "ipopt, nlopt, blanket");
         return 0;
     case O_LEVEL:
         if (strcmp(value, "standard") == 0) return 0;
@@ -181,11 +196,20 @@ static int take_option(int option, const char *value, arguments *a) {
             return not_yet(value[0] == 'd' ? "--level draft" : "--level fine");
         return usage_fault("--level", value, "draft, standard, fine");
     case O_BUDGET:
-        return positive_number(value) ? not_yet("--budget")
-                                      : usage_fault("--budget", value, "seconds above 0");
+        a->budget = positive_number(value);
+        return a->budget > 0.0 ? 0 : usage_fault("--budget", value, "seconds above 0");
+    case O_SAMPLE:
+        a->sample = positive_number(value);
+        return a->sample > 0.0 ? 0 : usage_fault("--sample", value, "seconds above 0");
+    case O_FORMAT:
+        a->format = value;
+        return 0; /* the library knows which there are */
+    case O_AXES:
+        return not_yet("--axes");
     case O_THREADS:
         if (strcmp(value, "1") == 0) return 0;
-        return positive_number(value) ? not_yet("--threads above 1") : usage_fault("--threads", value, "1");
+        return positive_number(value) > 0.0 ? not_yet("--threads above 1")
+                                            : usage_fault("--threads", value, "1");
     case O_OVERWRITE:
         a->overwrite = true;
         return 0;
@@ -219,7 +243,7 @@ static int take_option(int option, const char *value, arguments *a) {
 }
 
 /* Who takes an option. */
-enum { PLAN = 1, CHECK = 2, PICTURE = 4, INFO = 8, COMPARE = 16, ALL = 31 };
+enum { PLAN = 1, CHECK = 2, PICTURE = 4, INFO = 8, COMPARE = 16, EXPORT = 32, ALL = 63 };
 
 static const struct option options[] = {{"method", required_argument, NULL, O_METHOD},
                                         {"level", required_argument, NULL, O_LEVEL},
@@ -231,6 +255,9 @@ static const struct option options[] = {{"method", required_argument, NULL, O_ME
                                         {"threads", required_argument, NULL, O_THREADS},
                                         {"schedule", required_argument, NULL, O_SCHEDULE},
                                         {"of", required_argument, NULL, O_OF},
+                                        {"format", required_argument, NULL, O_FORMAT},
+                                        {"sample", required_argument, NULL, O_SAMPLE},
+                                        {"axes", required_argument, NULL, O_AXES},
                                         {"help", no_argument, NULL, O_HELP},
                                         {"version", no_argument, NULL, O_VERSION},
                                         {NULL, 0, NULL, 0}};
@@ -238,9 +265,13 @@ static const struct option options[] = {{"method", required_argument, NULL, O_ME
 static int takers(int option) {
     switch (option) {
     case 'o':
-        return PLAN | PICTURE | COMPARE;
+        return PLAN | PICTURE | COMPARE | EXPORT;
     case O_OVERWRITE:
-        return PLAN | COMPARE;
+        return PLAN | COMPARE | EXPORT;
+    case O_FORMAT:
+    case O_SAMPLE:
+    case O_AXES:
+        return EXPORT;
     case O_SCHEDULE:
         return CHECK;
     case O_OF:
@@ -286,9 +317,10 @@ static int read_arguments(int argc, char **argv, int command, const char *name, 
         if (code != 0) return code;
     }
     if (argc - optind != 1 && !(command == COMPARE && argc > optind))
-        return usage_fault(argc - optind < 1 ? "nothing to work on" : "too many arguments",
-                           argc - optind < 1 ? "" : argv[optind + 1],
-                           "one scene (plan, info), scenes (compare) or one plan folder (check, picture)");
+        return usage_fault(
+            argc - optind < 1 ? "nothing to work on" : "too many arguments",
+            argc - optind < 1 ? "" : argv[optind + 1],
+            "one scene (plan, info), scenes (compare) or one plan folder (check, picture, export)");
     a->subject = argv[optind];
     a->subjects = (const char *const *)&argv[optind];
     a->subject_count = argc - optind;
@@ -302,6 +334,10 @@ static morph_job make_job(const arguments *a, screen *s) {
     job.folder = a->output;
     if (a->method) job.method = a->method;
     job.overwrite = a->overwrite;
+    job.format = a->format;
+    job.sample = a->sample;
+    job.budget = a->budget;
+    job.motion = a->motion;
     job.message = on_message;
     if (!a->quiet) job.warning = on_message;
     job.log = on_log;
@@ -311,66 +347,55 @@ static morph_job make_job(const arguments *a, screen *s) {
     return job;
 }
 
-static int run_plan(const arguments *a) {
-    screen s;
-    const morph_job job = make_job(a, &s);
-    char *text = NULL, *json = NULL;
-    int code = morph_plan_scene(a->subject, &job, &text, a->json ? &json : NULL);
-    clear_bar(&s);
-    code = print_result(a->json ? json : text, code);
-    free(text);
-    free(json);
-    return code;
+/* What a command does; *text is its result for stdout, or stays NULL. */
+typedef int command_call(const arguments *a, const morph_job *job, char **text);
+
+static int call_plan(const arguments *a, const morph_job *job, char **text) {
+    return morph_plan_scene(a->subject, job, a->json ? NULL : text, a->json ? text : NULL);
 }
 
-static int run_check(const arguments *a) {
-    screen s;
-    const morph_job job = make_job(a, &s);
-    char *text = NULL;
-    int code = morph_check_folder(a->subject, a->schedule, &job, &text);
-    clear_bar(&s);
-    code = print_result(text, code);
-    free(text);
-    return code;
+static int call_check(const arguments *a, const morph_job *job, char **text) {
+    return morph_check_folder(a->subject, a->schedule, job, text);
 }
 
-static int run_picture(const arguments *a) {
-    screen s;
-    morph_job job = make_job(a, &s);
-    job.motion = a->motion;
+static int call_picture(const arguments *a, const morph_job *job, char **text) {
+    (void)text;
     if (!a->output) return usage_fault("picture", "no -o", "-o FILE.svg or -o FILE.png");
-    return morph_picture_folder(a->subject, a->output, &job);
+    return morph_picture_folder(a->subject, a->output, job);
 }
 
-static int run_info(const arguments *a) {
+static int call_export(const arguments *a, const morph_job *job, char **text) {
+    if (!a->format) return usage_fault("export", "no --format", "--format csv");
+    return morph_export_folder(a->subject, a->output, job, text);
+}
+
+static int call_info(const arguments *a, const morph_job *job, char **text) {
+    return morph_info_scene(a->subject, job, text);
+}
+
+static int call_compare(const arguments *a, const morph_job *job, char **text) {
+    return morph_compare_scenes(a->subjects, a->subject_count, job, text);
+}
+
+static int run(command_call *call, const arguments *a) {
     screen s;
     const morph_job job = make_job(a, &s);
     char *text = NULL;
-    int code = morph_info_scene(a->subject, &job, &text);
-    code = print_result(text, code);
-    free(text);
-    return code;
-}
-
-static int run_compare(const arguments *a) {
-    screen s;
-    const morph_job job = make_job(a, &s);
-    char *text = NULL;
-    int code = morph_compare_scenes(a->subjects, a->subject_count, &job, &text);
+    const int code = call(a, &job, &text);
     clear_bar(&s);
-    code = print_result(text, code);
+    const int printed = print_result(text, code);
     free(text);
-    return code;
+    return printed;
 }
 
 int main(int argc, char **argv) {
     static const struct {
         const char *name;
-        int (*run)(const arguments *);
+        command_call *call;
         int takes;
     } commands[] = {
-        {"plan", run_plan, PLAN}, {"check", run_check, CHECK},       {"picture", run_picture, PICTURE},
-        {"info", run_info, INFO}, {"compare", run_compare, COMPARE}, {"export", NULL, 0},
+        {"plan", call_plan, PLAN}, {"check", call_check, CHECK},       {"picture", call_picture, PICTURE},
+        {"info", call_info, INFO}, {"compare", call_compare, COMPARE}, {"export", call_export, EXPORT},
         {"trade", NULL, 0}};
     arguments a = {0};
     if (argc < 2) {
@@ -379,17 +404,17 @@ int main(int argc, char **argv) {
     }
     if (argv[1][0] == '-') {
         const int code = read_arguments(argc, argv, 0, "", &a);
-        return code ? code : usage_fault("no command", "", "plan, compare, check, picture, info");
+        return code ? code : usage_fault("no command", "", "plan, compare, check, picture, export, info");
     }
     for (size_t k = 0; k < sizeof commands / sizeof *commands; k++) {
         if (strcmp(argv[1], commands[k].name) != 0) continue;
-        if (!commands[k].run) return not_yet(commands[k].name);
+        if (!commands[k].call) return not_yet(commands[k].name);
         const int code = read_arguments(argc - 1, argv + 1, commands[k].takes, commands[k].name, &a);
         if (code) return code;
         struct sigaction action = {.sa_handler = on_signal};
         sigaction(SIGINT, &action, NULL);
         sigaction(SIGTERM, &action, NULL);
-        return commands[k].run(&a);
+        return run(commands[k].call, &a);
     }
-    return usage_fault("unknown command", argv[1], "plan, compare, check, picture, info");
+    return usage_fault("unknown command", argv[1], "plan, compare, check, picture, export, info");
 }

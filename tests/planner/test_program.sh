@@ -143,6 +143,8 @@ refused plan "$scene" "$scene"
 refused plan "$work/missing.yaml"
 says missing.yaml
 refused plan "$scene" --budget -5
+refused plan "$scene" --budget 0
+refused plan "$scene" --budget soon
 refused plan "$scene" --level best
 refused plan "$scene" -o "$work/none/box.plan"
 says "$work/none"
@@ -184,6 +186,47 @@ expect 0 "$program" plan "$work/coarse.yaml" -o "$work/coarse.plan" --quiet
 expect 0 "$program" check "$work/coarse.plan" --quiet
 rm -r "$work/coarse.plan"
 
+# Exports: as schedule.csv at the plan's own step, at any other, never over a file unasked.
+expect 0 "$program" export "$plan" --format csv -o "$work/export.csv"
+holds "nothing on stdout" [ ! -s "$work/out" ]
+links=$(head -n 1 "$plan/schedule.csv" | tr ',' '\n' | grep -c link)
+holds "three columns a link" [ "$(head -n 1 "$work/export.csv" | tr ',' '\n' | grep -c link)" -eq $((3 * links)) ]
+cut -d, -f "1-$((links + 1))" "$work/export.csv" >"$work/lengths.csv"
+holds "the lengths of schedule.csv" cmp "$work/lengths.csv" "$plan/schedule.csv"
+expect 0 "$program" check "$plan" --schedule "$work/lengths.csv" --quiet
+expect 0 "$program" export "$plan" --format csv --sample 0.01
+holds "on stdout" [ "$(wc -l <"$work/out")" -gt 10 ]
+cut -d, -f "1-$((links + 1))" "$work/out" >"$work/lengths.csv"
+cp "$work/out" "$work/coarse.csv"
+expect 0 "$program" check "$plan" --schedule "$work/lengths.csv" --quiet
+cp "$work/export.csv" "$work/before.csv"
+refused export "$plan" --format csv -o "$work/export.csv" --sample 0.01
+says 'export.csv: is there already: .*--overwrite'
+holds "the file stays" cmp "$work/export.csv" "$work/before.csv"
+expect 0 "$program" export "$plan" --format csv -o "$work/export.csv" --sample 0.01 --overwrite
+holds "replaced" cmp "$work/export.csv" "$work/coarse.csv"
+refused export "$plan"
+says '\--format'
+refused export "$plan" --format csv --sample 0
+refused export "$plan" --format csv --sample 1e-9
+refused export "$plan" --format csv --axes axes.yaml
+says 'not available yet: --axes'
+for format in jtc pvt csp mcap vtk; do
+    refused export "$plan" --format $format
+    says "not available yet: --format $format"
+done
+refused export "$plan" --format xls
+refused export "$work" --format csv
+refused plan "$scene" --sample 0.1
+
+# A budget: a feasible plan, soon; that it ran out is told.
+expect 0 "$program" plan "$placed" --budget 0.5 -o "$work/budget.plan"
+says 'the budget of 0.5 s'
+holds "it is feasible" [ "$(outcome "$work/budget.plan")" = feasible ]
+holds "the summary tells" grep -q '"ran_out":[[:space:]]*true' "$work/budget.plan/summary.json"
+expect 0 "$program" check "$work/budget.plan" --quiet
+rm -r "$work/budget.plan"
+
 # What comes later is refused by name.
 later() {
     name=$1
@@ -199,8 +242,6 @@ later trade trade "$scene"
 run "$program" plan "$placed" --method nlopt -o "$work/nlopt.plan" --quiet
 holds "--method nlopt ends with 0 or 3, not $code" [ "$code" -eq 0 -o "$code" -eq 3 ]
 holds 'it says what guided it' grep -q '"guided"' "$work/nlopt.plan/summary.json"
-later export export "$plan" --format csv
-later '--budget' plan "$scene" --budget 5
 later '--level draft' plan "$scene" --level draft
 later '--level fine' plan "$scene" --level fine
 later '--threads' plan "$scene" --threads 2
