@@ -18,4 +18,23 @@ typedef struct morph_hits {
 void morph_hits_free(morph_hits *hits);
 morph_status morph_hits_find(const morph_distance *d, double x, double y, morph_hits *hits);
 
+/* The pieces of a vertical line that are cavity: bottom and top, upward; one may begin where another ends. */
+typedef struct morph_pieces {
+    double (*z)[2];
+    int count, capacity;
+} morph_pieces;
+
+/* Columns over the box of the skin: column (i, j) stands at lo + (i + 1/2, j + 1/2) width. */
+typedef struct morph_columns {
+    int nx, ny;
+    double lo[2], width[2];
+} morph_columns;
+
+/* Called for every column that holds cavity, j fastest. Another result than MORPH_OK ends the sweep. */
+typedef morph_status (*morph_piece_visit)(void *data, int i, int j, const morph_pieces *pieces);
+
+/* All columns at x, `cell` wide (m) or wider. *columns is set before the first visit. */
+morph_status morph_cavity_sweep(const morph_cavity *cavity, const double *x, double cell,
+                                morph_columns *columns, morph_piece_visit visit, void *data);
+
 #endif

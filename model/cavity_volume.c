@@ -130,20 +130,31 @@ static bool piece_inside(const column *c, int target_winding, double z0, double 
     return morph_inside(c->cavity->target, (double[3]){c->x, c->y, z0 + (z1 - z0) / 2});
 }
 
-/* Height of the cavity in one column: all crossings, upward. */
-static double column_height(const column *c) {
+/* The pieces of one column that are cavity, upward. Grows as needed. */
+static morph_status column_pieces(const column *c, morph_pieces *out) {
+    const int most = c->on_skin.count + c->on_target.count;
+    out->count = 0;
+    if (most > out->capacity) {
+        free(out->z);
+        out->z = morph_alloc((size_t)(2 * most), sizeof *out->z);
+        out->capacity = out->z ? 2 * most : 0;
+        if (!out->z) return MORPH_ERR_NOMEM;
+    }
     int winding = 0, inside = 0, i = 0, j = 0;
     for (int k = 0; k < c->on_skin.count; k++)
         winding += c->on_skin.sign[k];
     for (int k = 0; k < c->on_target.count; k++)
         inside += c->on_target.sign[k];
-    double height = 0, from = c->floor;
+    double from = c->floor;
     while (i < c->on_skin.count) {
         const bool skin_next = j >= c->on_target.count || c->on_skin.z[i] <= c->on_target.z[j];
         const double z = skin_next ? c->on_skin.z[i] : c->on_target.z[j];
         if (z > from) {
-            /* Without a floor the winding below the lowest crossing is 0: nothing infinite is added. */
-            if (winding >= 1 && isfinite(from) && !piece_inside(c, inside, from, z)) height += z - from;
+            /* Without a floor the winding below the lowest crossing is 0: nothing infinite is kept. */
+            if (winding >= 1 && isfinite(from) && !piece_inside(c, inside, from, z)) {
+                out->z[out->count][0] = from;
+                out->z[out->count++][1] = z;
+            }
             from = z;
         }
         if (skin_next)
@@ -151,11 +162,12 @@ static double column_height(const column *c) {
         else
             inside -= c->on_target.sign[j++];
     }
-    return height;
+    return MORPH_OK;
 }
 
-morph_status morph_cavity_volume(const morph_cavity *cavity, const double *x, double cell, double *volume) {
-    *volume = 0;
+morph_status morph_cavity_sweep(const morph_cavity *cavity, const double *x, double cell,
+                                morph_columns *columns, morph_piece_visit visit, void *data) {
+    *columns = (morph_columns){0};
     if (!(cell > 0)) return MORPH_ERR_INPUT;
     const bool fan = !isfinite(cavity->base);
     morph_distance *skin;
@@ -167,7 +179,8 @@ morph_status morph_cavity_volume(const morph_cavity *cavity, const double *x, do
     /* A sheet on edge is one row of columns of no width. */
     const int nx = (int)fmin(fmax(1, ceil(wx / wide)), MAX_COLUMNS);
     const int ny = (int)fmin(fmax(1, ceil(wy / wide)), MAX_COLUMNS);
-    double sum = 0;
+    *columns = (morph_columns){nx, ny, {skin->lo[0], skin->lo[1]}, {wx / nx, wy / ny}};
+    morph_pieces pieces = {0};
     for (int i = 0; i < nx && status == MORPH_OK; i++)
         for (int j = 0; j < ny && status == MORPH_OK; j++) {
             c.x = skin->lo[0] + (i + 0.5) * (wx / nx);
@@ -175,11 +188,30 @@ morph_status morph_cavity_volume(const morph_cavity *cavity, const double *x, do
             status = morph_hits_find(skin, c.x, c.y, &c.on_skin);
             if (status != MORPH_OK || c.on_skin.count == 0) continue;
             status = morph_hits_find(cavity->target, c.x, c.y, &c.on_target);
-            if (status == MORPH_OK) sum += column_height(&c);
+            if (status == MORPH_OK) status = column_pieces(&c, &pieces);
+            if (status == MORPH_OK && pieces.count > 0) status = visit(data, i, j, &pieces);
         }
-    *volume = sum * (wx / nx) * (wy / ny);
+    free(pieces.z);
     morph_hits_free(&c.on_skin);
     morph_hits_free(&c.on_target);
     morph_distance_destroy(skin);
+    return status;
+}
+
+static morph_status add_column(void *data, int i, int j, const morph_pieces *pieces) {
+    (void)i;
+    (void)j;
+    double height = 0, *sum = data;
+    for (int k = 0; k < pieces->count; k++)
+        height += pieces->z[k][1] - pieces->z[k][0];
+    *sum += height;
+    return MORPH_OK;
+}
+
+morph_status morph_cavity_volume(const morph_cavity *cavity, const double *x, double cell, double *volume) {
+    morph_columns columns;
+    double sum = 0;
+    const morph_status status = morph_cavity_sweep(cavity, x, cell, &columns, add_column, &sum);
+    *volume = sum * columns.width[0] * columns.width[1];
     return status;
 }

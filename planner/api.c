@@ -264,9 +264,12 @@ int morph_picture_folder(const char *folder, const char *file, const morph_job *
         return MORPH_EXIT_INPUT;
     }
     morph_status status = morph_folder_read(folder, &record, message, sizeof message);
-    if (status == MORPH_OK && job && job->motion)
+    const bool cavity = job && job->motion && strcmp(job->motion, "cavity") == 0;
+    if (status == MORPH_OK && job && job->motion && !cavity)
         status = morph_picture_select(&record, job->motion, message, sizeof message);
-    if (status == MORPH_OK) status = morph_picture_write(&record, NULL, file, message, sizeof message);
+    if (status == MORPH_OK)
+        status = cavity ? morph_picture_cavity(&record, file, message, sizeof message)
+                        : morph_picture_write(&record, NULL, file, message, sizeof message);
     morph_record_free(&record);
     if (status == MORPH_OK) return MORPH_EXIT_DONE;
     if (!message[0]) return fail(job, folder, status);

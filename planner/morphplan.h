@@ -30,7 +30,7 @@ enum morph_exit {
 typedef struct morph_job {
     const char *folder; /* plan folder; NULL: the scene's path without ending, + ".plan" */
     const char *method; /* "ipopt" (default), "nlopt" or "blanket" */
-    const char *motion; /* picture: "schedule" (default), "blanket", "replay", "core" */
+    const char *motion; /* picture: "schedule" (default), "blanket", "replay", "core", or "cavity" */
     const char *format; /* export: "csv" (default) */
     double sample;      /* export: s between rows; 0: the plan's own */
     double budget;      /* plan: s until the best feasible plan so far is written; 0: none */

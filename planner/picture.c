@@ -233,8 +233,7 @@ static morph_status draw_page(cairo_t *c, const morph_record *r, const char *tit
     return status;
 }
 
-/* The record with a deformable target as it is at the end. Borrows everything. */
-static morph_record pressed(const morph_record *r) {
+morph_record morph_picture_pressed(const morph_record *r) {
     morph_record end = *r;
     if (!r->deformed_v || !r->deformed_t) return end;
     end.target_vertices = r->deformed_vertices;
@@ -269,7 +268,7 @@ static morph_status draw_panel(cairo_t *c, const morph_record *r, int panel, con
         room = (morph_box){box->x + 10, box->y + 10, box->width - 20, box->height - 20};
         morph_view_fit(&view, &bounds, &room);
     }
-    const morph_record shown = panel >= 3 ? pressed(r) : *r;
+    const morph_record shown = panel >= 3 ? morph_picture_pressed(r) : *r;
     morph_status status = morph_relief_create(&shown, &view, &relief);
     if (status == MORPH_OK && panel < 4) {
         status = draw_moment(c, &shown, which, panel, box, &view, &relief);
@@ -287,11 +286,24 @@ static cairo_status_t collect(void *closure, const unsigned char *data, unsigned
     return text->failed ? CAIRO_STATUS_NO_MEMORY : CAIRO_STATUS_SUCCESS;
 }
 
-/* panel -1: the whole page. The surface is drawn, finished and destroyed. */
-static morph_status render(cairo_surface_t *surface, const morph_record *r, const char *title, int panel,
-                           const morph_box *box, bool png, morph_text *out) {
+/* What is drawn: the whole page of a record, or one of its panels. */
+typedef struct drawing {
+    const morph_record *record;
+    const char *title;
+    int panel; /* -1: the page */
+    const morph_box *box;
+} drawing;
+
+static morph_status draw_record(cairo_t *c, const void *data) {
+    const drawing *d = data;
+    return d->panel < 0 ? draw_page(c, d->record, d->title) : draw_panel(c, d->record, d->panel, d->box);
+}
+
+/* The surface is drawn, finished and destroyed. */
+static morph_status render(cairo_surface_t *surface, morph_draw draw, const void *data, bool png,
+                           morph_text *out) {
     cairo_t *c = cairo_create(surface);
-    morph_status status = panel < 0 ? draw_page(c, r, title) : draw_panel(c, r, panel, box);
+    morph_status status = draw(c, data);
     cairo_status_t drawn = cairo_status(c);
     cairo_destroy(c);
     if (status == MORPH_OK && drawn == CAIRO_STATUS_SUCCESS && png)
@@ -309,24 +321,21 @@ static bool ends_with(const char *file, const char *ending) {
     return n > m && strcasecmp(file + n - m, ending) == 0;
 }
 
-morph_status morph_picture_write(const morph_record *record, const char *title, const char *file,
-                                 char *message, size_t size) {
-    bool png = ends_with(file, ".png");
-    if (!png && !ends_with(file, ".svg"))
-        return morph_fail(MORPH_ERR_INPUT, message, size, "%s: the name must end in .svg or .png", file);
-    if (record->samples == 0 && record->nominal_frames == 0)
-        return morph_fail(MORPH_ERR_INPUT, message, size, "%s: the plan holds no motion to draw", file);
-    if (!drawable(record))
-        return morph_fail(MORPH_ERR_INPUT, message, size,
-                          "%s: the plan holds a number that is not finite and cannot be drawn", file);
+morph_status morph_picture_ending(const char *file, char *message, size_t size) {
+    if (ends_with(file, ".png") || ends_with(file, ".svg")) return MORPH_OK;
+    return morph_fail(MORPH_ERR_INPUT, message, size, "%s: the name must end in .svg or .png", file);
+}
+
+morph_status morph_picture_file(const char *file, int width, int height, morph_draw draw, const void *data,
+                                char *message, size_t size) {
+    const bool png = ends_with(file, ".png");
     morph_locale locale;
     if (!morph_locale_enter(&locale))
         return morph_fail(MORPH_ERR_NOMEM, message, size, "%s: out of memory", file);
     morph_text text = {0};
-    cairo_surface_t *surface =
-        png ? cairo_image_surface_create(CAIRO_FORMAT_RGB24, PAGE_WIDTH, PAGE_HEIGHT)
-            : cairo_svg_surface_create_for_stream(collect, &text, PAGE_WIDTH, PAGE_HEIGHT);
-    morph_status status = render(surface, record, title, -1, NULL, png, &text);
+    cairo_surface_t *surface = png ? cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)
+                                   : cairo_svg_surface_create_for_stream(collect, &text, width, height);
+    morph_status status = render(surface, draw, data, png, &text);
     morph_locale_leave(&locale);
     if (status == MORPH_OK)
         status = morph_file_replace(file, text.data, text.size, message, size);
@@ -334,6 +343,25 @@ morph_status morph_picture_write(const morph_record *record, const char *title, 
         morph_fail(status, message, size, "%s: cannot be drawn: %s", file, morph_status_text(status));
     morph_text_free(&text);
     return status;
+}
+
+morph_status morph_picture_drawable(const morph_record *record, const char *file, char *message,
+                                    size_t size) {
+    if (drawable(record)) return MORPH_OK;
+    return morph_fail(MORPH_ERR_INPUT, message, size,
+                      "%s: the plan holds a number that is not finite and cannot be drawn", file);
+}
+
+morph_status morph_picture_write(const morph_record *record, const char *title, const char *file,
+                                 char *message, size_t size) {
+    morph_status status = morph_picture_ending(file, message, size);
+    if (status != MORPH_OK) return status;
+    if (record->samples == 0 && record->nominal_frames == 0)
+        return morph_fail(MORPH_ERR_INPUT, message, size, "%s: the plan holds no motion to draw", file);
+    status = morph_picture_drawable(record, file, message, size);
+    if (status != MORPH_OK) return status;
+    const drawing page = {record, title, -1, NULL};
+    return morph_picture_file(file, PAGE_WIDTH, PAGE_HEIGHT, draw_record, &page, message, size);
 }
 
 /* Cairo numbers its symbols alike in every picture; on one page they must differ. Every id and every
@@ -368,7 +396,8 @@ morph_status morph_picture_svg(const morph_record *record, int panel, double wid
     morph_text svg = {0}, out = {0};
     const morph_box box = {0, 0, width, height};
     cairo_surface_t *surface = cairo_svg_surface_create_for_stream(collect, &svg, width, height);
-    morph_status status = render(surface, record, NULL, panel, &box, false, &svg);
+    const drawing one = {record, NULL, panel, &box};
+    morph_status status = render(surface, draw_record, &one, false, &svg);
     if (status == MORPH_OK && svg.data) embed(&svg, panel, &out);
     if (status == MORPH_OK && (out.failed || !out.data)) status = MORPH_ERR_NOMEM;
     morph_locale_leave(&locale);

@@ -18,8 +18,13 @@ morph_status morph_picture_select(morph_record *record, const char *motion, char
 morph_status morph_picture_write(const morph_record *record, const char *title, const char *file,
                                  char *message, size_t size);
 
-/* The same as SVG text for embedding in a page (free()): panel 0..3 the moments, 4 one link's length, 5 all
- * lengths, 6 nominal blanket's end, 7 plan's end. */
+/* Draws the cavities of the pure blanket's end (left) and of the plan's end (right): the skin coloured by its
+ * gap, two exact vertical cuts through the blanket's largest cavity, volumes and mean gaps. MORPH_ERR_INPUT
+ * with a message where the plan lacks one of the two, a skin or a target. */
+morph_status morph_picture_cavity(const morph_record *record, const char *file, char *message, size_t size);
+
+/* Parts of morph_picture_write as SVG text for embedding in a page (free()): panel 0..3 the moments, 4 one
+ * link's length, 5 all lengths, 6 nominal blanket's end, 7 plan's end. */
 morph_status morph_picture_svg(const morph_record *record, int panel, double width, double height,
                                char **text);
 

@@ -87,6 +87,17 @@ morph_status morph_draw_length(cairo_t *c, const morph_record *record, const mor
 morph_status morph_draw_lengths(cairo_t *c, const morph_record *record, const morph_motion *motion,
                                 const morph_box *box);
 
+/* The record with a deformable target as it is at the end. Borrows everything. */
+morph_record morph_picture_pressed(const morph_record *record);
+
+/* Files: an ending that is not taken and numbers that are not finite are refused with a message; then `draw`
+ * fills a page of width x height points. */
+typedef morph_status (*morph_draw)(cairo_t *c, const void *data);
+morph_status morph_picture_ending(const char *file, char *message, size_t size);
+morph_status morph_picture_drawable(const morph_record *record, const char *file, char *message, size_t size);
+morph_status morph_picture_file(const char *file, int width, int height, morph_draw draw, const void *data,
+                                char *message, size_t size);
+
 /* About `wanted` ticks at 1, 2 or 5 times a power of ten within [lo, hi]; *first is the first, *count their
  * number, *digits after the decimal point. Returns the step. */
 double morph_ticks(double lo, double hi, int wanted, double *first, int *count, int *digits);

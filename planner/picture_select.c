@@ -49,7 +49,8 @@ morph_status morph_picture_select(morph_record *r, const char *motion, char *mes
     const int frames[] = {r->samples, r->nominal_frames, r->replay_frames, r->core_frames};
     if (which == MORPH_PICTURE_MOTIONS)
         return morph_fail(MORPH_ERR_INPUT, message, size,
-                          "'%s' is no motion, allowed: schedule, blanket, replay, core", motion);
+                          "'%s' is nothing to draw, allowed: schedule, blanket, replay, core, cavity",
+                          motion);
     if (frames[which] < 1)
         return morph_fail(MORPH_ERR_INPUT, message, size, "this plan holds no %s to draw", motion);
     if (which == 0) return MORPH_OK;

@@ -23,16 +23,47 @@ void morph_planner_accuracy(morph_planner *p) {
     s->sdf_max = p->work.accuracy.max;
 }
 
-/* Measures where the target stands: the pose is seen from there. */
-morph_status morph_planner_measure(const morph_planner *p, const double *x, double lift, morph_measure *out) {
+/* The pose as it is seen from a target raised by `lift`; free(). NULL: memory refused. */
+static double *seen_from_target(const morph_planner *p, const double *x, double lift) {
     const int n = 3 * p->work.structure->joints;
     double *seen = morph_alloc((size_t)n, sizeof(double));
-    if (!seen) return MORPH_ERR_NOMEM;
-    for (int i = 0; i < n; i++)
+    for (int i = 0; seen && i < n; i++)
         seen[i] = x[i] - (i % 3 == 2 ? lift : 0.0);
+    return seen;
+}
+
+/* Measures where the target stands: the pose is seen from there. */
+morph_status morph_planner_measure(const morph_planner *p, const double *x, double lift, morph_measure *out) {
+    double *seen = seen_from_target(p, x, lift);
+    if (!seen) return MORPH_ERR_NOMEM;
     const morph_status status = morph_cavity_measure(p->work.cavity, seen, out);
     free(seen);
     return status;
+}
+
+morph_status morph_planner_cavities(const morph_planner *p, const double *x, double lift,
+                                    morph_cavity_list *out) {
+    const morph_structure *st = p->work.structure;
+    *out = (morph_cavity_list){0};
+    double *seen = seen_from_target(p, x, lift);
+    if (!seen) return MORPH_ERR_NOMEM;
+    morph_cavity_parts parts;
+    const morph_status status =
+        morph_cavity_parts_find(p->work.cavity, seen, st->spacing / MORPH_CAVITY_COLUMNS,
+                                morph_cavity_film(st), MORPH_CAVITY_SHARE, &parts);
+    free(seen);
+    if (status != MORPH_OK) return status;
+    out->volume = parts.volume;
+    out->film = parts.film;
+    for (; out->count < parts.count && out->count < MORPH_CAVITIES; out->count++) {
+        morph_cavity_part *part = &out->part[out->count];
+        *part = parts.part[out->count];
+        part->at[2] += lift;
+        part->lo[2] += lift;
+        part->hi[2] += lift;
+    }
+    morph_cavity_parts_free(&parts);
+    return MORPH_OK;
 }
 
 /* Findings of the reach check, one line each; a ridge that the sheet rounds off is left to `info`. */
@@ -68,10 +99,11 @@ static morph_status stage_measure(morph_planner *p) {
     morph_summary *s = &p->plan->summary;
     const size_t width = 3 * (size_t)p->work.structure->joints;
     morph_progress(morph_planner_control(p), "measure", 0.0);
-    morph_status status =
-        morph_planner_measure(p, &r->schedule_joints[(size_t)(r->samples - 1) * width],
-                              r->offset_schedule[3 * (size_t)(r->samples - 1) + 2], &s->plan);
+    const double *end = &r->schedule_joints[(size_t)(r->samples - 1) * width];
+    const double lift = r->offset_schedule[3 * (size_t)(r->samples - 1) + 2];
+    morph_status status = morph_planner_measure(p, end, lift, &s->plan);
     s->has_plan = status == MORPH_OK;
+    if (status == MORPH_OK) status = morph_planner_cavities(p, end, lift, &s->cavities_plan);
     if (status == MORPH_OK) status = morph_record_mobility(r, p->work.structure);
     if (status == MORPH_OK) {
         const int last = r->mobility_samples - 1;

@@ -99,6 +99,10 @@ void morph_planner_accuracy(morph_planner *p);
  *  Fails with MORPH_ERR_NOMEM. */
 morph_status morph_planner_measure(const morph_planner *p, const double *x, double lift, morph_measure *out);
 
+/** The connected cavities of the same pose; places are the pose's own, not the raised target's. */
+morph_status morph_planner_cavities(const morph_planner *p, const double *x, double lift,
+                                    morph_cavity_list *out);
+
 /** The stages, in their order in the plan. Each notes its seconds and effort in the summary, turns a stop
  * into `stopped`, and returns an error only where nothing can go on. */
 morph_status morph_stage_nominal(morph_planner *p);

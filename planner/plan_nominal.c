@@ -109,8 +109,10 @@ morph_status morph_stage_nominal(morph_planner *p) {
         p->end = morph_alloc(width, sizeof(double));
         if (!p->end) return MORPH_ERR_NOMEM;
         memcpy(p->end, last, width * sizeof *last);
-        status = morph_planner_measure(p, last, p->nominal.lift[p->nominal.frames - 1], &s->blanket);
+        const double lift = p->nominal.lift[p->nominal.frames - 1];
+        status = morph_planner_measure(p, last, lift, &s->blanket);
         s->has_blanket = status == MORPH_OK;
+        if (status == MORPH_OK) status = morph_planner_cavities(p, last, lift, &s->cavities_blanket);
     }
     if (status == MORPH_OK) note_jumps(p);
     if (status == MORPH_OK && s->blanket_report.held_up) note_held_up(p);

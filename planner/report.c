@@ -104,6 +104,7 @@ static morph_status body(morph_text *page, const morph_record *r, const morph_su
         status = figures(page, r, "Blanket and plan", 6, 7, 360, ends);
     if (status != MORPH_OK) return status;
     morph_report_measures(page, s);
+    morph_report_cavities(page, s);
     morph_report_margins(page, s);
     if (moves) status = figures(page, r, "Lengths over time", 4, 5, 380, NULL);
     morph_report_structure(page, r, s);

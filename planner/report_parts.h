@@ -12,6 +12,7 @@ void morph_report_quantity(morph_text *page, double value, const char *unit);
 
 void morph_report_outcome(morph_text *page, const morph_summary *summary);
 void morph_report_measures(morph_text *page, const morph_summary *summary);
+void morph_report_cavities(morph_text *page, const morph_summary *summary);
 void morph_report_margins(morph_text *page, const morph_summary *summary);
 void morph_report_structure(morph_text *page, const morph_record *record, const morph_summary *summary);
 void morph_report_solver(morph_text *page, const morph_summary *summary);

@@ -125,6 +125,49 @@ void morph_report_measures(morph_text *page, const morph_summary *s) {
     morph_text_add(page, ".</p>\n");
 }
 
+/* Volume, share and place of a cavity; empty cells where there is no such one. */
+static void cavity_cells(morph_text *page, const morph_cavity_list *list, int k) {
+    if (k >= list->count) {
+        morph_text_add(page, "<td></td><td></td><td></td>");
+        return;
+    }
+    const morph_cavity_part *part = &list->part[k];
+    morph_text_add(page, "<td class=\"n\">");
+    morph_report_quantity(page, part->volume, "m3");
+    morph_text_add(page, "</td><td class=\"n\">%.1f&nbsp;%%</td><td class=\"n soft\">%.3f, %.3f, %.3f</td>",
+                   100 * part->volume / list->volume, part->at[0], part->at[1], part->at[2]);
+}
+
+void morph_report_cavities(morph_text *page, const morph_summary *s) {
+    const morph_cavity_list *b = &s->cavities_blanket, *p = &s->cavities_plan;
+    const int rows = b->count > p->count ? b->count : p->count;
+    if (rows == 0) return;
+    morph_text_add(page,
+                   "<h2>Connected cavities, before and after</h2>\n<table>\n<tr><th></th>"
+                   "<th class=\"n\" colspan=\"3\">Pure blanket: volume, share, centroid [m]</th>"
+                   "<th class=\"n\" colspan=\"3\">Plan</th></tr>\n");
+    for (int k = 0; k < rows; k++) {
+        morph_text_add(page, "<tr><td>%d</td>", k + 1);
+        cavity_cells(page, b, k);
+        cavity_cells(page, p, k);
+        morph_text_add(page, "</tr>\n");
+    }
+    morph_text_add(page,
+                   "</table>\n<p class=\"soft\">The largest, of at least %.0f&nbsp;%% of the cavity "
+                   "volume each. The film where the sheet lies on the target joins none of them: ",
+                   100 * MORPH_CAVITY_SHARE);
+    if (s->has_blanket) {
+        morph_report_quantity(page, b->film, "m3");
+        morph_text_add(page, " under the blanket");
+    }
+    if (s->has_plan) {
+        morph_text_add(page, "%s", s->has_blanket ? ", " : "");
+        morph_report_quantity(page, p->film, "m3");
+        morph_text_add(page, " under the plan");
+    }
+    morph_text_add(page, ".</p>\n");
+}
+
 static const char *margin_words(morph_margin_kind kind) {
     switch (kind) {
     case MORPH_MARGIN_LENGTH:

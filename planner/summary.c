@@ -110,6 +110,38 @@ static void put_measures(builder *b, cJSON *root, const morph_summary *s) {
     put_each(b, root, "coverage", s, offsetof(morph_measure, coverage));
 }
 
+static void put_place(builder *b, cJSON *at, const char *key, const double place[3]) {
+    cJSON *array = keep(b, cJSON_AddArrayToObject(at, key));
+    for (int d = 0; array && d < 3; d++) {
+        char text[32];
+        morph_number(place[d], text);
+        cJSON *item = keep(b, cJSON_CreateRaw(text));
+        if (item) cJSON_AddItemToArray(array, item);
+    }
+}
+
+static void put_cavity_list(builder *b, cJSON *at, const char *key, const morph_cavity_list *list) {
+    cJSON *array = keep(b, cJSON_AddArrayToObject(at, key));
+    for (int k = 0; array && k < list->count; k++) {
+        const morph_cavity_part *part = &list->part[k];
+        cJSON *item = keep(b, cJSON_CreateObject());
+        if (!item) return;
+        cJSON_AddItemToArray(array, item);
+        put_number(b, item, "volume", part->volume);
+        put_place(b, item, "at", part->at);
+        put_number(b, item, "share", part->volume / list->volume);
+        put_number(b, item, "height", part->height);
+        put_number(b, item, "area", part->area);
+    }
+}
+
+/* The largest connected cavities before and after. */
+static void put_cavities(builder *b, cJSON *root, const morph_summary *s) {
+    cJSON *cavities = put_object(b, root, "cavities");
+    put_cavity_list(b, cavities, "blanket", &s->cavities_blanket);
+    put_cavity_list(b, cavities, "plan", &s->cavities_plan);
+}
+
 /* What the lengths alone do to the structure: distances to the plan's end with rigid motion removed. */
 static void put_replay(builder *b, cJSON *root, const char *key, const morph_replay_report *r) {
     if (!r->done) {
@@ -261,6 +293,7 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_text(b, root, "reason", s->reason);
     put_number(b, root, "spacing", s->spacing);
     put_measures(b, root, s);
+    put_cavities(b, root, s);
     put_reach(b, root, &s->reach);
     put_deformable(b, root, &s->deformable);
     put_margins(b, root, s);

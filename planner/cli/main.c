@@ -19,7 +19,9 @@ static const char usage_text[] =
     "  picture DIR -o FILE.svg|png        still pictures: four moments, lengths over time\n"
     "          [--of MOTION]              of the schedule (default), the blanket, the replay of its "
     "lengths,\n"
-    "                                     or core: the replay with the target as a solid core\n"
+    "                                     core: the replay with the target as a solid core; or cavity: "
+    "the\n"
+    "                                     cavities under the blanket and under the plan\n"
     "  export DIR --format csv [-o FILE]  lengths, rates and accelerations over time (default: on stdout)\n"
     "          [--sample S] [--overwrite] the same curve every S seconds (default: as planned); replace "
     "FILE\n"
@@ -223,9 +225,9 @@ static int take_option(int option, const char *value, arguments *a) {
     case O_OF:
         a->motion = value;
         if (strcmp(value, "schedule") == 0 || strcmp(value, "blanket") == 0 || strcmp(value, "replay") == 0 ||
-            strcmp(value, "core") == 0)
+            strcmp(value, "core") == 0 || strcmp(value, "cavity") == 0)
             return 0;
-        return usage_fault("--of", value, "schedule, blanket, replay, core");
+        return usage_fault("--of", value, "schedule, blanket, replay, core, cavity");
     case O_SCHEDULE:
         a->schedule = value;
         return 0;

@@ -186,6 +186,8 @@ static morph_summary make_summary(void) {
     s.plan.gap_mean = 0.001;
     s.blanket.gap_mean = 0.02;
     s.blanket.gap_max = NAN;
+    s.cavities_blanket = (morph_cavity_list){
+        1, {{.volume = 0.5, .at = {0.25, -1.0 / 3, 2}, .height = 0.125, .area = 4}}, 2, 0.5};
     s.duration = 3.25;
     s.rows_refine_used = 17;
     s.rows_path_possible = 900;
@@ -219,6 +221,17 @@ static void summary_json(void **state) {
     assert_true(at(root, "margins", "clearance", "time") == 1.25);
     assert_null(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "margins"), "panel"));
     assert_null(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "cavity_volume"), "guided"));
+    const cJSON *cavities = cJSON_GetObjectItem(root, "cavities");
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(cavities, "blanket")), 1);
+    assert_true(cJSON_IsArray(cJSON_GetObjectItem(cavities, "plan")));
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(cavities, "plan")), 0);
+    const cJSON *cavity = cJSON_GetArrayItem(cJSON_GetObjectItem(cavities, "blanket"), 0);
+    assert_true(at(cavity, "volume", NULL, NULL) == 0.5);
+    assert_true(at(cavity, "share", NULL, NULL) == 0.25);
+    assert_true(at(cavity, "height", NULL, NULL) == 0.125);
+    assert_true(at(cavity, "area", NULL, NULL) == 4);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(cavity, "at")), 3);
+    assert_true(cJSON_GetArrayItem(cJSON_GetObjectItem(cavity, "at"), 1)->valuedouble == -1.0 / 3);
     at(root, "mobility", "free", NULL);
     at(root, "iterations", "timing", NULL);
     at(root, "target_volume", NULL, NULL);

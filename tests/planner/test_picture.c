@@ -2,7 +2,7 @@
 #include "folder_fixture.h"
 
 #include "planner/picture.h"
-#include "planner/picture_parts.h"
+#include "planner/picture_cavity.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -156,6 +156,112 @@ static void refusals(void **state) {
     morph_record_free(&r);
 }
 
+/* A pixel of one colour, to rounding. */
+static bool near(const unsigned char *p, int red, int green, int blue) {
+    return abs(p[2] - red) <= 1 && abs(p[1] - green) <= 1 && abs(p[0] - blue) <= 1;
+}
+
+/* The file of cavities: a whole picture with the colours of sheet, target and cavity in its cuts. */
+static void cavity_png(void **state) {
+    (void)state;
+    morph_record r = fixture_record(7, 6, 11);
+    char path[128], message[256] = "";
+    path_to("c.png", path);
+    if (morph_picture_cavity(&r, path, message, sizeof message) != MORPH_OK) fail_msg("%s", message);
+    cairo_surface_t *image = cairo_image_surface_create_from_png(path);
+    assert_int_equal(cairo_surface_status(image), CAIRO_STATUS_SUCCESS);
+    const int width = cairo_image_surface_get_width(image), height = cairo_image_surface_get_height(image);
+    int white = 0, blue = 0, cavity[2] = {0, 0}, grey[2] = {0, 0};
+    const unsigned char *data = cairo_image_surface_get_data(image);
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++) {
+            const unsigned char *p = data + y * cairo_image_surface_get_stride(image) + 4 * x;
+            white += p[0] == 255 && p[1] == 255 && p[2] == 255;
+            blue += near(p, 13, 94, 158);
+            if (y < height - 400) continue; /* the cuts, blanket to the left, plan to the right */
+            cavity[x > width / 2] += near(p, 214, 94, 0);
+            grey[x > width / 2] += near(p, 189, 191, 196);
+        }
+    print_message("white %d of %d, blue %d, cavity %d and %d, grey %d and %d\n", white, width * height, blue,
+                  cavity[0], cavity[1], grey[0], grey[1]);
+    assert_true(white > width * height / 2);
+    assert_true(blue > 2000);
+    for (int k = 0; k < 2; k++) {
+        assert_true(cavity[k] > 1000);
+        assert_true(grey[k] > 5000);
+    }
+    assert_true(cavity[0] > cavity[1]); /* the fixture's blanket hangs higher than its plan */
+    cairo_surface_destroy(image);
+    unlink(path);
+    morph_record_free(&r);
+}
+
+static void cavity_svg(void **state) {
+    (void)state;
+    char path[128], message[256] = "";
+    path_to("c.svg", path);
+    for (int variant = 0; variant < 3; variant++) {
+        morph_record r = fixture_record(5, 5, 11);
+        if (variant == 1) r.base = NAN;
+        for (int i = 2; variant == 2 && i < 3 * r.target_vertices; i += 3)
+            r.target_v[i] += 50; /* nothing near: a cut through the middle of the target still */
+        if (morph_picture_cavity(&r, path, message, sizeof message) != MORPH_OK)
+            fail_msg("%d: %s", variant, message);
+        char *text = load(path);
+        assert_balanced(text);
+        free(text);
+        unlink(path);
+        morph_record_free(&r);
+    }
+}
+
+static void cavity_refusals(void **state) {
+    (void)state;
+    char path[128], message[256] = "";
+    morph_record r = fixture_record(4, 4, 11);
+    path_to("c.gif", path);
+    assert_int_equal(morph_picture_cavity(&r, path, message, sizeof message), MORPH_ERR_INPUT);
+    assert_non_null(strstr(message, ".svg or .png"));
+    path_to("c.png", path);
+    int *const counts[] = {&r.nominal_frames, &r.samples, &r.skin_triangles, &r.target_triangles};
+    static const char *const names[] = {"no blanket", "no schedule", "no skin", "no target"};
+    for (int k = 0; k < 4; k++) {
+        const int count = *counts[k];
+        *counts[k] = 0;
+        assert_int_equal(morph_picture_cavity(&r, path, message, sizeof message), MORPH_ERR_INPUT);
+        assert_non_null(strstr(message, names[k]));
+        *counts[k] = count;
+    }
+    r.target_v[4] = INFINITY;
+    assert_int_equal(morph_picture_cavity(&r, path, message, sizeof message), MORPH_ERR_INPUT);
+    assert_non_null(strstr(message, "not finite"));
+    r.target_v[4] = 0;
+    assert_int_equal(morph_picture_cavity(&r, "/no/such/folder/c.png", message, sizeof message),
+                     MORPH_ERR_INPUT);
+    assert_int_not_equal(access(path, F_OK), 0);
+    morph_record_free(&r);
+}
+
+/* From pale to dark without a turn in brightness, whatever the number of tones. */
+static void gap_tones(void **state) {
+    (void)state;
+    static const double most[] = {0.07, 1e-9, 3, 0.0999999, 1234};
+    for (size_t k = 0; k < sizeof most / sizeof *most; k++) {
+        const morph_gap_scale scale = morph_gap_scale_to(most[k]);
+        assert_in_range(scale.tones, 5, 15);
+        assert_true(scale.step * scale.tones >= most[k] * (1 - 1e-9));
+        assert_true(scale.step * (scale.tones - 1) < most[k]);
+        double before = INFINITY;
+        for (int tone = 0; tone < scale.tones; tone++) {
+            const morph_colour c = morph_gap_colour(&scale, tone);
+            const double bright = 0.2126 * pow(c.r, 2.2) + 0.7152 * pow(c.g, 2.2) + 0.0722 * pow(c.b, 2.2);
+            assert_true(bright < before);
+            before = bright;
+        }
+        assert_true(before < 0.03);
+    }
+}
+
 /* No base, no target, no schedule, one sample: still a picture. */
 static void sparse_records(void **state) {
     (void)state;
@@ -221,6 +327,10 @@ int main(void) {
         cmocka_unit_test(panels),
         cmocka_unit_test(refusals),
         cmocka_unit_test(sparse_records),
+        cmocka_unit_test(cavity_png),
+        cmocka_unit_test(cavity_svg),
+        cmocka_unit_test(cavity_refusals),
+        cmocka_unit_test(gap_tones),
         cmocka_unit_test(hidden_parts),
         cmocka_unit_test(ticks),
     };

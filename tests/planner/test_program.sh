@@ -91,6 +91,22 @@ one_line
 expect 2 "$program" picture "$plan" -o "$work/none/box.svg"
 says "$work/none/box.svg"
 absent "$work" box.jpeg
+expect 0 "$program" picture "$plan" --of cavity -o "$work/cavity.svg"
+holds "a whole SVG file of cavities" grep -q '</svg>' "$work/cavity.svg"
+expect 0 "$program" picture "$plan" --of cavity -o "$work/cavity.png"
+holds "a whole PNG file of cavities" [ "$(tail -c 8 "$work/cavity.png" | head -c 4)" = IEND ]
+expect 2 "$program" picture "$plan" --of cavity -o "$work/cavity.gif"
+says 'svg'
+absent "$work" cavity.gif
+expect 2 "$program" picture "$plan" --of cavities -o "$work/cavities.svg"
+one_line
+says 'allowed: schedule, blanket, replay, core, cavity'
+absent "$work" cavities.svg
+
+# The cavities of summary.json and of the report.
+holds "a list of cavities" grep -q '"cavities":' "$plan/summary.json"
+holds "shares of the cavity volume" grep -q '"share":' "$plan/summary.json"
+holds "the report's cavities" grep -q 'Connected cavities, before and after' "$plan/report.html"
 
 expect 0 "$program" info "$scene"
 holds "the structure is told" grep -q '32 joints, 48 links, 16 posts' "$work/out"

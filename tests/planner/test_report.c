@@ -16,6 +16,12 @@ static morph_summary make_summary(void) {
     snprintf(s.scene, sizeof s.scene, "scenes/<ball>.yaml");
     s.blanket = (morph_measure){0.012, 0.018, 0.04, 0.06, 0.02, 0.81, 1e-4};
     s.plan = (morph_measure){0.003, 0.004, 0.01, 0.02, 0.005, 0.97, 1e-5};
+    s.cavities_blanket = (morph_cavity_list){
+        2,
+        {{.volume = 0.008, .at = {0.2, -0.125, 0.05}}, {.volume = 0.001, .at = {0, 0.1, 0.05}}},
+        0.012,
+        0.002};
+    s.cavities_plan = (morph_cavity_list){1, {{.volume = 0.0012, .at = {0.25, -0.1, 0.04}}}, 0.003, 0.001};
     s.duration = 4;
     s.free_motions = 26;
     s.check.margin[MORPH_MARGIN_LENGTH] =
@@ -49,6 +55,12 @@ static void whole_page(void **state) {
     assert_has(page, "97.0&nbsp;%");
     assert_has(page, "link 17 (2,1)-(3,1) bottom");
     assert_has(page, "26 motions stay free");
+    assert_has(page,
+               "<td>1</td><td class=\"n\">8&nbsp;litres</td><td class=\"n\">66.7&nbsp;%</td><td class=\"n "
+               "soft\">0.200, -0.125, 0.050</td>");
+    assert_has(page, "40.0&nbsp;%</td><td class=\"n soft\">0.250, -0.100, 0.040</td>");
+    assert_has(page, "8.3&nbsp;%</td><td class=\"n soft\">0.000, 0.100, 0.050</td><td></td>");
+    assert_has(page, "2&nbsp;litres under the blanket, 1&nbsp;litres under the plan");
     assert_has(page, "&lt;script&gt;alert(1)");
     assert_has(page, "joint 3 &lt;x&gt;");
     assert_null(strstr(page, "<script"));
