@@ -23,11 +23,11 @@ morph_placement_options morph_placement_defaults(void) {
                                      .strongest = 60.0,
                                      .thrift = 1e-7,
                                      .hold = 10.0,
-                                     .last_reach = 0.01,
+                                     .last_reach = 0.003,
                                      .epsilon = 1e-3,
                                      .last_epsilon = 9e-7,
                                      .iterations = 60,
-                                     .last_iterations = 300,
+                                     .last_iterations = 150,
                                      .rounds = 8,
                                      .most_centres = 3};
 }
@@ -67,6 +67,14 @@ static void stand_at(placer *p, const double *x) {
 
 static const double *last_of(const placer *p, const morph_trajectory *t) {
     return &t->x[(size_t)(t->frames - 1) * width(p)];
+}
+
+/* Root mean square distance of joints, spacings; x, y in metres. */
+static double apart(const placer *p, const double *x, const double *y) {
+    double squares = 0.0;
+    for (size_t i = 0; i < width(p); i++)
+        squares += (x[i] - y[i]) * (x[i] - y[i]);
+    return sqrt(3.0 * squares / (double)width(p)) / p->w->structure->spacing;
 }
 
 static bool late(const placer *p) {
@@ -155,10 +163,7 @@ static morph_status judge(placer *p, const morph_balance *b, const double *z, tr
         status = morph_guided_run(p->w, p->scene, p->x, t->centre, t->centres, &p->quiet, &t->way, NULL);
     if (status == MORPH_OK) {
         const double *end = last_of(p, &t->way);
-        double squares = 0.0;
-        for (size_t i = 0; i < width(p); i++)
-            squares += (end[i] - shape[i]) * (end[i] - shape[i]);
-        t->difference = sqrt(3.0 * squares / (double)width(p)) / a;
+        t->difference = apart(p, end, shape);
         status = morph_cavity_measure(p->w->cavity, end, &t->measure);
     }
     free(shape);
@@ -257,6 +262,34 @@ static morph_status grow(placer *p) {
     return status;
 }
 
+/* Friction lets a sheet creep that has come to rest as far as frames tell. Under the same centres it goes on
+ * until that moves it by less than this, rms over the joints, spacings: what a program then says can be held
+ * against it. */
+#define CREEP 0.01
+enum { MOST_CREEPS = 6 };
+
+static morph_status settle_down(placer *p) {
+    morph_placement *out = p->out;
+    double moved = INFINITY;
+    morph_status status = MORPH_OK;
+    for (int k = 0; k < MOST_CREEPS && moved > CREEP && !late(p) && status == MORPH_OK; k++) {
+        morph_trajectory way = {0};
+        status = morph_guided_run(p->w, p->scene, p->x, out->centre, out->centres, &p->quiet, &way, NULL);
+        if (status == MORPH_OK) {
+            const double *end = last_of(p, &way);
+            moved = apart(p, end, p->x);
+            stand_at(p, end);
+            status = morph_cavity_measure(p->w->cavity, end, &out->reached);
+            p->objective = scaled_objective(p, &out->reached);
+        }
+        if (status == MORPH_OK) status = morph_trajectory_append(&out->guided, &way);
+        morph_trajectory_free(&way);
+    }
+    morph_log(p->options->control, "placement: at rest but for %.3f spacings; objective %.4g", moved,
+              p->objective);
+    return status;
+}
+
 /* The last program, with contacts as hard as they are: what the rounds' smoothing left is shown here. Its
  * centres are kept if the blanket agrees. */
 static morph_status conclude(placer *p) {
@@ -313,6 +346,7 @@ static morph_status place(placer *p, const double *x0) {
     status = run_seeds(p);
     if (status == MORPH_OK) status = rounds(p, out->seed, out->seeds);
     if (status == MORPH_OK) status = grow(p);
+    if (status == MORPH_OK) status = settle_down(p);
     if (status == MORPH_OK) status = conclude(p);
     return status;
 }

@@ -115,8 +115,10 @@ static morph_status stage_measure(morph_planner *p) {
     return status;
 }
 
-/* What lasts longer than this is no morph that anybody waits for, and its replay would take minutes. */
-#define LONGEST_REPLAY 120.0 /* s */
+/* What lasts longer than this is no morph that anybody waits for, and its replay would take minutes; where
+ * limits are broken anyway, sheets that crumple make it hours. */
+#define LONGEST_REPLAY 120.0           /* s */
+#define LONGEST_INFEASIBLE_REPLAY 10.0 /* s */
 
 /* What the lengths alone do: once as the scene says the structure is carried, once over the target as a solid
  * core. */
@@ -125,7 +127,7 @@ static morph_status stage_replay(morph_planner *p) {
     morph_record *r = &p->plan->record;
     if (p->stopped) return MORPH_OK;
     morph_planner_limit(p, MORPH_STAGE_REPLAY);
-    if (s->duration > LONGEST_REPLAY) {
+    if (s->duration > (s->feasible ? LONGEST_REPLAY : LONGEST_INFEASIBLE_REPLAY)) {
         morph_log(morph_planner_control(p), "replay: left out, a schedule of %.0f s is too long",
                   s->duration);
         return MORPH_OK;

@@ -8,6 +8,8 @@ if [ -n "$slow" ]; then
 fi
 mkdir "$work/here" && cd "$work/here" || exit 1
 touch "$work/out"
+# OpenBLAS waits for ever, when a process forks, for threads that it had no memory to start.
+export OPENBLAS_NUM_THREADS=1
 
 # start: plans in the background ($pid).
 start() {
