@@ -300,6 +300,7 @@ morph_status morph_plan_run(const morph_scene *scene, const morph_plan_options *
     const double since = morph_seconds();
     /* One BLAS thread: sums then repeat bit for bit. */
     morph_blas_threads(1);
+    if (morph_blas_claim() != MORPH_OK) return MORPH_ERR_NOMEM;
     morph_planner p = {.scene = scene, .options = options, .started = since};
     p.way = &p.nominal;
     morph_planner_listen(&p);

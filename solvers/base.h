@@ -44,6 +44,10 @@ double morph_seconds(void);
 /* Pins OpenBLAS (where it is the BLAS) to n threads, so that sums repeat bit for bit. */
 void morph_blas_threads(int n);
 
+/* OpenBLAS maps its work space at its first large product, and where it cannot it waits for ever. This has it
+ * mapped now, for this process and those that it forks. MORPH_ERR_NOMEM where there is no room. */
+morph_status morph_blas_claim(void);
+
 /* Name of OpenBLAS's kernel on this machine (results are the same bits per kernel only); "" with another
  * BLAS. */
 const char *morph_blas_name(void);

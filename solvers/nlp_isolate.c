@@ -9,7 +9,6 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -116,19 +115,10 @@ static bool attend(pid_t pid, int pipe, const morph_nlp_options *o, morph_run *r
     return killed;
 }
 
-/* OpenBLAS maps this much at its first product, and waits for ever where it cannot. */
-#define BLAS_ROOM ((size_t)144 << 20)
-
-static bool has_room(void) {
-    void *room =
-        mmap(NULL, BLAS_ROOM, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    return room != MAP_FAILED && munmap(room, BLAS_ROOM) == 0;
-}
-
 void morph_run_isolated(morph_nlp *nlp, const morph_nlp_options *options, morph_run *shared) {
     int ends[2];
     shared->status = MORPH_ERR_NOMEM;
-    if (!has_room() || pipe(ends) != 0) return;
+    if (morph_blas_claim() != MORPH_OK || pipe(ends) != 0) return;
     if (fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) goto closed;
     const pid_t parent = getpid(), pid = fork();
     if (pid < 0) goto closed;
