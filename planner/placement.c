@@ -27,7 +27,7 @@ morph_placement_options morph_placement_defaults(void) {
                                      .epsilon = 1e-3,
                                      .last_epsilon = 9e-7,
                                      .iterations = 60,
-                                     .last_iterations = 150,
+                                     .last_iterations = 250,
                                      .rounds = 8,
                                      .most_centres = 3};
 }
@@ -268,25 +268,25 @@ static morph_status grow(placer *p) {
 #define CREEP 0.01
 enum { MOST_CREEPS = 6 };
 
-static morph_status settle_down(placer *p) {
-    morph_placement *out = p->out;
+/* *way: the frames of that, from where the rounds ended. */
+static morph_status settle_down(placer *p, morph_trajectory *way) {
+    const morph_placement *out = p->out;
     double moved = INFINITY;
     morph_status status = MORPH_OK;
     for (int k = 0; k < MOST_CREEPS && moved > CREEP && !late(p) && status == MORPH_OK; k++) {
-        morph_trajectory way = {0};
-        status = morph_guided_run(p->w, p->scene, p->x, out->centre, out->centres, &p->quiet, &way, NULL);
+        morph_trajectory more = {0};
+        status = morph_guided_run(p->w, p->scene, p->x, out->centre, out->centres, &p->quiet, &more, NULL);
         if (status == MORPH_OK) {
-            const double *end = last_of(p, &way);
-            moved = apart(p, end, p->x);
-            stand_at(p, end);
-            status = morph_cavity_measure(p->w->cavity, end, &out->reached);
-            p->objective = scaled_objective(p, &out->reached);
+            moved = apart(p, last_of(p, &more), p->x);
+            stand_at(p, last_of(p, &more));
+            if (k > 0) status = morph_trajectory_append(way, &more);
         }
-        if (status == MORPH_OK) status = morph_trajectory_append(&out->guided, &way);
-        morph_trajectory_free(&way);
+        if (k == 0 && status == MORPH_OK)
+            *way = more;
+        else
+            morph_trajectory_free(&more);
     }
-    morph_log(p->options->control, "placement: at rest but for %.3f spacings; objective %.4g", moved,
-              p->objective);
+    morph_log(p->options->control, "placement: at rest but for %.3f spacings", moved);
     return status;
 }
 
@@ -295,14 +295,16 @@ static morph_status settle_down(placer *p) {
 static morph_status conclude(placer *p) {
     morph_placement *out = p->out;
     morph_balance *b = NULL;
-    morph_rest rest;
+    morph_rest rest = {0};
     morph_nlp_result result = {0};
     double *z = NULL;
     trial t = {0};
     morph_placement_options o = *p->options;
     o.epsilon = o.last_epsilon;
     o.iterations = o.last_iterations;
-    morph_status status = adopt(p, out->centre, out->centres, o.epsilon, &b, &rest);
+    morph_trajectory still = {0};
+    morph_status status = settle_down(p, &still);
+    if (status == MORPH_OK) status = adopt(p, out->centre, out->centres, o.epsilon, &b, &rest);
     if (status == MORPH_OK)
         status = proposal_of(&o)(p->w, b, &o, o.last_reach, time_left(p), &rest, &z, &result);
     if (status == MORPH_OK) {
@@ -325,8 +327,12 @@ static morph_status conclude(placer *p) {
             snprintf(out->reason, sizeof out->reason, "the last program: %s", result.solver_text);
         else if (!out->balance.stable)
             snprintf(out->reason, sizeof out->reason, "the last program ended at a saddle");
-        if (scaled_objective(p, &t.measure) < p->objective) status = accept(p, &t);
+        if (scaled_objective(p, &t.measure) < p->objective) {
+            if (still.frames > 0) status = morph_trajectory_append(&out->guided, &still);
+            if (status == MORPH_OK) status = accept(p, &t);
+        }
     }
+    morph_trajectory_free(&still);
     morph_trajectory_free(&t.way);
     morph_nlp_result_free(&result);
     morph_rest_free(&rest);
@@ -346,7 +352,6 @@ static morph_status place(placer *p, const double *x0) {
     status = run_seeds(p);
     if (status == MORPH_OK) status = rounds(p, out->seed, out->seeds);
     if (status == MORPH_OK) status = grow(p);
-    if (status == MORPH_OK) status = settle_down(p);
     if (status == MORPH_OK) status = conclude(p);
     return status;
 }
