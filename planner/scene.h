@@ -73,6 +73,7 @@ typedef struct morph_scene {
     morph_hand *touch;       /* touches */
     morph_attractor *centre; /* centres, of MORPH_ATTRACT_LIST */
     int (*fixed_node)[2];    /* structure.fixed_nodes: structure.fixed as a list of nodes (i, j), each once */
+    int *stuck_link;         /* structure.stuck_links: structure.link.stuck, each once */
 } morph_scene;
 
 /* Where faults go: one line each, "FILE:LINE: key: what is wrong, what is allowed". */

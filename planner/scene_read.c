@@ -218,6 +218,7 @@ void morph_scene_destroy(morph_scene *scene) {
     free(scene->touch);
     free(scene->centre);
     free(scene->fixed_node);
+    free(scene->stuck_link);
     free(scene);
 }
 

@@ -128,7 +128,10 @@ static void put_structure(buffer *b, const morph_structure_def *def) {
     put_number(b, "    jerk", def->jerk);
     put_number(b, "    stiffness", def->stiffness);
     put_number(b, "    damping", def->damping);
-    put(b, "    stuck: []\n");
+    put(b, "    stuck: [");
+    for (int k = 0; k < def->stuck_links; k++)
+        put(b, "%s%d", k ? ", " : "", def->stuck_link[k]);
+    put(b, "]\n");
     put(b, "  angle:\n");
     put_numbers(b, "    link_post", def->link_post, 2, true);
     put_numbers(b, "    link_link", def->link_link, 2, true);

@@ -142,6 +142,15 @@ static void limit_lines(FILE *out, const morph_structure *s) {
             in_degrees(d->link_link[0]), in_degrees(d->link_link[1]));
 }
 
+static void stuck_lines(FILE *out, const morph_structure *s) {
+    for (int k = 0; k < s->def.stuck_links; k++) {
+        char name[64];
+        const int l = s->def.stuck_link[k];
+        morph_link_name(s, l, name, sizeof name);
+        fprintf(out, "stuck      %s holds %.9g m\n", name, s->length_limit[l][0]);
+    }
+}
+
 static void mobility_lines(FILE *out, const morph_structure *s, const morph_mobility *m) {
     fprintf(out,
             "mobility   flat: %d free motions, %d redundant rows (rank %d of %d rows: links%s%s), least "
@@ -172,6 +181,7 @@ char *morph_info_text(const morph_scene *scene, const morph_structure *s, const 
     fprintf(out, "scene      %s\n", scene->title && scene->title[0] ? scene->title : scene->file);
     structure_lines(out, s);
     limit_lines(out, s);
+    stuck_lines(out, s);
     mobility_lines(out, s, m);
     target_lines(out, &scene->target_report);
     morph_reach_lines(out, reach);
