@@ -243,7 +243,10 @@ static bool put_scene(buffer *b, const morph_scene *scene, const char *mesh_file
         put_number(b, "base", scene->base);
     put_motion(b, scene);
     put_attractors(b, scene);
-    put(b, "start: flat\n");
+    if (!scene->start.file)
+        put(b, "start: flat\n");
+    else if (!put_text(b, "start", scene->start.as_written))
+        return false;
     put_goal(b, &scene->goal);
     put(b, "schedule:\n");
     if (scene->duration > 0.0)

@@ -1,6 +1,7 @@
 #include "planner/text.h"
 
 #include "planner/reach_text.h"
+#include "planner/start.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -151,6 +152,16 @@ static void stuck_lines(FILE *out, const morph_structure *s) {
     }
 }
 
+static void start_lines(FILE *out, const morph_start *start) {
+    if (start->kind == MORPH_START_FLAT) return;
+    fprintf(out, "start      %s (%s): %d free motions there", start->as_written,
+            morph_start_name(start->kind), start->free_motions);
+    if (start->kind == MORPH_START_LENGTHS)
+        fprintf(out, "; lengths met to %.3g m, another shape of them found %.3g m away", start->residual,
+                start->doubt);
+    fprintf(out, "\n");
+}
+
 static void mobility_lines(FILE *out, const morph_structure *s, const morph_mobility *m) {
     fprintf(out,
             "mobility   flat: %d free motions, %d redundant rows (rank %d of %d rows: links%s%s), least "
@@ -182,6 +193,7 @@ char *morph_info_text(const morph_scene *scene, const morph_structure *s, const 
     structure_lines(out, s);
     limit_lines(out, s);
     stuck_lines(out, s);
+    start_lines(out, &scene->start);
     mobility_lines(out, s, m);
     target_lines(out, &scene->target_report);
     morph_reach_lines(out, reach);
