@@ -135,24 +135,35 @@ static double residual(const morph_structure *s, const double *x, const double *
     return worst;
 }
 
-/* How far another shape of the same lengths lies: from the shape bent into a dome, a quarter of a spacing
- * high, by least motion back to the lengths. What is left of the dome is what lengths do not see. */
+/* How far other shapes of the same lengths lie: from the shape bent by half a spacing (up, down, into a
+ * saddle each way, twisted each way), by least motion back to the lengths. What is left of the bend is what
+ * lengths do not see. The largest of a few, so the true doubt is no smaller. */
 static morph_status doubt(const morph_structure *s, morph_start *start) {
     const size_t n = 3 * (size_t)s->joints;
     double *x = morph_alloc(n, sizeof(double)), widest = 0.0;
-    morph_shape_report report;
-    if (!x) return MORPH_ERR_NOMEM;
-    memcpy(x, start->pose, n * sizeof *x);
-    for (int j = 0; j < s->joints; j++)
-        widest = fmax(widest, hypot(s->start[3 * j], s->start[3 * j + 1]));
-    for (int j = 0; j < s->joints; j++) {
-        const double from = hypot(s->start[3 * j], s->start[3 * j + 1]) / widest;
-        x[3 * j + 2] += 0.25 * s->spacing * (1.0 - from * from);
+    morph_status status = x ? MORPH_OK : MORPH_ERR_NOMEM;
+    for (int i = 0; i < 3 * s->joints; i++)
+        if (i % 3 != 2) widest = fmax(widest, fabs(s->start[i]));
+    for (int bend = 0; bend < 6 && status != MORPH_ERR_NOMEM; bend++) {
+        morph_shape_report report;
+        double off = 0.0;
+        for (int j = 0; j < s->joints; j++) {
+            const double u = s->start[3 * j] / widest, v = s->start[3 * j + 1] / widest;
+            const double shape = bend / 2 == 0   ? 0.5 * (u * u + v * v)
+                                 : bend / 2 == 1 ? u * u - v * v
+                                                 : u * v;
+            for (int c = 0; c < 3; c++)
+                x[3 * j + c] = start->pose[3 * j + c];
+            x[3 * j + 2] += (bend % 2 ? -0.5 : 0.5) * s->spacing * shape;
+        }
+        status = morph_shape_from_lengths(s, start->length, x, x, &report);
+        if (status == MORPH_OK && report.fits) {
+            status = morph_align(s->joints, x, start->pose, NULL, &off);
+            start->doubt = isnan(start->doubt) ? off : fmax(start->doubt, off);
+        }
     }
-    const morph_status status = morph_shape_from_lengths(s, start->length, x, x, &report);
-    if (status == MORPH_OK && report.fits) morph_align(s->joints, x, start->pose, NULL, &start->doubt);
     free(x);
-    return status == MORPH_ERR_NOMEM ? status : MORPH_OK;
+    return status == MORPH_ERR_NOMEM ? status : MORPH_OK; /* a bend that fails tells nothing */
 }
 
 /* Measured lengths are known to no better than this share of a spacing where links are redundant; beyond it
@@ -162,7 +173,12 @@ static const double most_residual = 1e-3;
 static morph_status shape(const morph_structure *s, morph_start *start, char *message, size_t size) {
     morph_shape_report report;
     int worst = 0;
-    morph_status status = morph_shape_from_lengths(s, start->length, s->start, start->pose, &report);
+    bool holds;
+    /* Near a pose that holds its angles, the least motion to the very lengths; without one from flat. */
+    morph_status status = morph_start_shape(&s->def, start->length, start->pose, &holds);
+    if (status == MORPH_OK)
+        status =
+            morph_shape_from_lengths(s, start->length, holds ? start->pose : s->start, start->pose, &report);
     if (status != MORPH_OK) return status;
     stiffen(s, start->pose);
     start->residual = residual(s, start->pose, start->length, &worst);
