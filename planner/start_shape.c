@@ -50,24 +50,44 @@ static int steps_for(const morph_structure *s, const double *length) {
     return (int)fmin(MOST_STEPS, 1.0 + floor(most / (longest_step * s->spacing)));
 }
 
-/* x: 3*joints, spacings; s's limits are overwritten. */
+/* One solve at a share of the way. x: 3*joints, spacings; s's limits are overwritten. */
+static morph_status solve_at(morph_structure *s, const morph_world *world, const double *length, double share,
+                             morph_active *active, double *x, bool *holds) {
+    /* Rounding, and what the last move to the very lengths takes. */
+    const morph_inset inset = {.angle = 1e-4, .self = 1e-4};
+    morph_effort effort = {0};
+    morph_violation v;
+    for (int l = 0; l < s->links; l++)
+        s->length_limit[l][0] = s->length_limit[l][1] =
+            s->start_length[l] + share * (length[l] - s->start_length[l]);
+    const morph_status status = morph_project(world, &inset, 8, NULL, active, x, &v, &effort);
+    *holds = status == MORPH_OK && morph_violation_worst(&v, morph_pose_tolerance, NULL) <= 1.0;
+    return status;
+}
+
+/* A step that fails is halved, a few times. */
 static morph_status follow(morph_structure *s, const morph_world *world, const double *length, double *x,
                            bool *holds) {
-    const morph_inset inset = {.angle = 2e-3, .self = 1e-3};
-    const int steps = steps_for(s, length);
+    const size_t bytes = 3 * (size_t)s->joints * sizeof *x;
+    const double first = 1.0 / steps_for(s, length);
+    double *before = morph_alloc(bytes, 1), share = 0.0, step = first;
     morph_active *active = NULL;
-    morph_effort effort = {0};
-    morph_status status = morph_active_create(s, &active);
+    morph_status status = before ? morph_active_create(s, &active) : MORPH_ERR_NOMEM;
     *holds = true;
-    for (int k = 1; k <= steps && status == MORPH_OK && *holds; k++) {
-        morph_violation v;
-        for (int l = 0; l < s->links; l++)
-            s->length_limit[l][0] = s->length_limit[l][1] =
-                s->start_length[l] + (double)k / steps * (length[l] - s->start_length[l]);
-        status = morph_project(world, &inset, 5, NULL, active, x, &v, &effort);
-        *holds = status == MORPH_OK && morph_violation_worst(&v, morph_pose_tolerance, NULL) <= 1.0;
+    while (status == MORPH_OK && share < 1.0 && step > first / 20.0) {
+        const double next = share + step > 1.0 - 1e-9 ? 1.0 : share + step;
+        memcpy(before, x, bytes);
+        status = solve_at(s, world, length, next, active, x, holds);
+        if (*holds) {
+            share = next;
+        } else {
+            memcpy(x, before, bytes);
+            step *= 0.5;
+        }
     }
+    *holds = status == MORPH_OK && share == 1.0;
     morph_active_destroy(active);
+    free(before);
     return status;
 }
 
