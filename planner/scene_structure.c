@@ -188,7 +188,7 @@ static void read_stuck(morph_scene_reader *r, const morph_value *link) {
         scene->stuck_link[used++] = (int)number;
     }
     scene->structure.stuck_links = used;
-    scene->structure.stuck_link = scene->stuck_link;
+    scene->structure.stuck_link = used > 0 ? scene->stuck_link : NULL;
 }
 
 /* Least distance of two links' axes at the flat start, with s the spacing and h the thickness. Parallel links
