@@ -57,6 +57,14 @@ static bool fixed_ok(const morph_structure_def *d) {
     return true;
 }
 
+static bool stuck_ok(const morph_structure_def *d) {
+    if (d->stuck_links < 0 || (d->stuck_links > 0 && !d->stuck_link)) return false;
+    const int links = d->stuck_links > 0 ? morph_link_count(d) : 0;
+    for (int k = 0; k < d->stuck_links; k++)
+        if (d->stuck_link[k] < 0 || d->stuck_link[k] >= links) return false;
+    return true;
+}
+
 static bool allocate(morph_structure *s) {
     const size_t j = (size_t)s->joints, l = (size_t)s->links, p = (size_t)s->posts;
     const size_t lp = (size_t)s->link_posts, ll = (size_t)s->link_links;
@@ -80,7 +88,8 @@ static bool allocate(morph_structure *s) {
            (s->start = morph_alloc(3 * j, sizeof(double))) &&
            (s->fixed = morph_alloc((size_t)s->fixed_count, sizeof(int))) &&
            (s->fixed_joint = morph_alloc((size_t)s->fixed_joints, sizeof(int))) &&
-           (s->fixed_node = morph_alloc((size_t)s->def.fixed_nodes, sizeof(int[2])));
+           (s->fixed_node = morph_alloc((size_t)s->def.fixed_nodes, sizeof(int[2]))) &&
+           (s->stuck_link = morph_alloc((size_t)s->def.stuck_links, sizeof(int)));
 }
 
 /* Marks the joints of the nodes held (the top layer has them all) and counts what is held. */
@@ -117,9 +126,18 @@ static void list_fixed(morph_structure *s) {
     s->def.fixed_node = (const int(*)[2])s->fixed_node;
 }
 
+/* A link that cannot move has one length: that of the start. */
+static void hold_stuck(morph_structure *s) {
+    for (int k = 0; k < s->def.stuck_links; k++) {
+        const int l = s->stuck_link[k] = s->def.stuck_link[k];
+        s->length_limit[l][0] = s->length_limit[l][1] = s->start_length[l];
+    }
+    s->def.stuck_link = s->stuck_link;
+}
+
 morph_status morph_structure_create(const morph_structure_def *def, morph_structure **out) {
     *out = NULL;
-    if (!def_ok(def) || !fixed_ok(def)) return MORPH_ERR_INPUT;
+    if (!def_ok(def) || !fixed_ok(def) || !stuck_ok(def)) return MORPH_ERR_INPUT;
     morph_structure *s = calloc(1, sizeof *s);
     if (!s) return MORPH_ERR_NOMEM;
     s->def = *def;
@@ -136,6 +154,7 @@ morph_status morph_structure_create(const morph_structure_def *def, morph_struct
     if (ok) {
         morph_structure_place(s, x_link, y_link);
         list_fixed(s);
+        hold_stuck(s);
     }
     free(x_link);
     free(y_link);
@@ -172,6 +191,7 @@ void morph_structure_destroy(morph_structure *s) {
     free(s->fixed_joint);
     free(s->joint_fixed);
     free(s->fixed_node);
+    free(s->stuck_link);
     free(s->start);
     free(s);
 }

@@ -49,6 +49,8 @@ typedef struct morph_structure_def {
     morph_fixed fixed;          /* nodes held where they start */
     int fixed_nodes;            /* of MORPH_FIXED_LIST, else not looked at */
     const int (*fixed_node)[2]; /* (i, j), repeats allowed; borrowed (a structure's own def: its copy) */
+    int stuck_links;            /* links that hold their start length: both limits are that */
+    const int *stuck_link;      /* their numbers, repeats allowed; borrowed as fixed_node is */
 } morph_structure_def;
 
 /* Immutable after create. All arrays are owned by the structure. */
@@ -84,6 +86,7 @@ typedef struct morph_structure {
     int *fixed_joint;     /* fixed_joints: all joints held, ascending */
     bool *joint_fixed;    /* joints */
     int (*fixed_node)[2]; /* behind def.fixed_node */
+    int *stuck_link;      /* behind def.stuck_link */
     double *start;        /* 3*joints: flat, bottom layer at z = 0, centred in x and y */
     double spacing;       /* scale of everything */
 } morph_structure;

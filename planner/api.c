@@ -6,6 +6,7 @@
 #include "planner/picture.h"
 #include "planner/plan.h"
 #include "planner/reach_text.h"
+#include "planner/start.h"
 #include "planner/text.h"
 
 #include <errno.h>
@@ -288,6 +289,7 @@ int morph_info_scene(const char *path, const morph_job *job, char **text) {
     morph_reach reach;
     morph_blas_threads(1);
     morph_status status = morph_structure_create(&scene->structure, &s);
+    if (status == MORPH_OK) morph_start_hold(&scene->start, s);
     if (status == MORPH_OK) status = morph_mobility_at(s, s->start, &mobility);
     if (status == MORPH_OK)
         status = morph_distance_create(&scene->target, scene->target_report.closed, &exact);

@@ -1,5 +1,7 @@
 #include "planner/curve.h"
 
+#include "planner/jet.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,6 +32,7 @@ morph_status morph_curve_create(const morph_structure *s, const double *paramete
     c->s = morph_alloc((size_t)poses, sizeof(double));
     c->pose = morph_alloc((size_t)poses * (size_t)width, sizeof(double));
     morph_status status = c->s && c->pose ? MORPH_OK : MORPH_ERR_NOMEM;
+    if (status == MORPH_OK) status = morph_hold_create(s, &c->hold);
     if (status == MORPH_OK) {
         memcpy(c->s, parameter, (size_t)poses * sizeof *c->s);
         for (int k = 0; k < poses; k++)
@@ -50,6 +53,7 @@ void morph_curve_destroy(morph_curve *c) {
     free(c->pose);
     free(c->lift);
     morph_spline_free(&c->spline);
+    morph_hold_destroy(c->hold);
     free(c);
 }
 
@@ -62,60 +66,29 @@ double morph_curve_lift(const morph_curve *c, double s) {
     return c->lift[k] + t * (c->lift[k + 1] - c->lift[k]);
 }
 
-/* Truncated Taylor arithmetic: coefficient k of a jet is the k-th derivative over k!. */
-static const double factorial[MORPH_JET] = {1.0, 1.0, 2.0, 6.0, 24.0, 120.0};
-
-static void jet_dot(const double (*u)[MORPH_JET], const double (*v)[MORPH_JET], int order, double *out) {
-    for (int k = 0; k <= order; k++) {
-        out[k] = 0.0;
-        for (int c = 0; c < 3; c++)
-            for (int i = 0; i <= k; i++)
-                out[k] += u[c][i] * v[c][k - i];
-    }
-}
-
-/* r = sqrt(a): r r = a, solved coefficient by coefficient. */
-static void jet_sqrt(const double *a, int order, double *r) {
-    r[0] = sqrt(a[0]);
-    for (int k = 1; k <= order; k++) {
-        double sum = a[k];
-        for (int i = 1; i < k; i++)
-            sum -= r[i] * r[k - i];
-        r[k] = sum / (2.0 * r[0]);
-    }
-}
-
-/* q = a / b: q b = a. q may alias a. */
-static void jet_divide(const double *a, const double *b, int order, double *q) {
-    for (int k = 0; k <= order; k++) {
-        double sum = a[k];
-        for (int i = 0; i < k; i++)
-            sum -= q[i] * b[k - i];
-        q[k] = sum / b[0];
-    }
-}
-
 void morph_curve_joints(const morph_curve *curve, double s, int order, double *scratch, double *out) {
     const morph_structure *st = curve->structure;
     const size_t width = (size_t)morph_pose_width(st), coordinates = 3 * (size_t)st->joints;
     if (st->posts == 0) {
         morph_spline_eval(&curve->spline, s, order, out);
+        morph_hold_apply(curve->hold, order, out);
         return;
     }
     morph_spline_eval(&curve->spline, s, order, scratch);
+    morph_hold_apply(curve->hold, order, scratch);
     for (int p = 0; p < st->posts; p++) {
         double q[3][MORPH_JET], square[MORPH_JET], norm[MORPH_JET];
         for (int c = 0; c < 3; c++)
             for (int k = 0; k <= order; k++)
-                q[c][k] = scratch[(size_t)k * width + 6 * (size_t)p + 3 + (size_t)c] / factorial[k];
-        jet_dot((const double(*)[MORPH_JET])q, (const double(*)[MORPH_JET])q, order, square);
-        jet_sqrt(square, order, norm);
+                q[c][k] = scratch[(size_t)k * width + 6 * (size_t)p + 3 + (size_t)c] / morph_factorial[k];
+        morph_jet_dot((const double(*)[MORPH_JET])q, (const double(*)[MORPH_JET])q, order, square);
+        morph_jet_sqrt(square, order, norm);
         const size_t b = 3 * (size_t)st->post[p][0], t = 3 * (size_t)st->post[p][1];
         for (size_t c = 0; c < 3; c++) {
-            jet_divide(q[c], norm, order, q[c]);
+            morph_jet_divide(q[c], norm, order, q[c]);
             for (int k = 0; k <= order; k++) {
                 const double centre = scratch[(size_t)k * width + 6 * (size_t)p + c];
-                const double half = 0.5 * st->post_length[p] * q[c][k] * factorial[k];
+                const double half = 0.5 * st->post_length[p] * q[c][k] * morph_factorial[k];
                 out[(size_t)k * coordinates + b + c] = centre - half;
                 out[(size_t)k * coordinates + t + c] = centre + half;
             }
@@ -132,10 +105,10 @@ void morph_curve_lengths(const morph_structure *st, const double *joints, int or
             for (int k = 0; k <= order; k++)
                 d[c][k] =
                     (joints[(size_t)k * coordinates + b + c] - joints[(size_t)k * coordinates + a + c]) /
-                    factorial[k];
-        jet_dot((const double(*)[MORPH_JET])d, (const double(*)[MORPH_JET])d, order, square);
-        jet_sqrt(square, order, length);
+                    morph_factorial[k];
+        morph_jet_dot((const double(*)[MORPH_JET])d, (const double(*)[MORPH_JET])d, order, square);
+        morph_jet_sqrt(square, order, length);
         for (int k = 0; k <= order; k++)
-            out[(size_t)k * (size_t)st->links + (size_t)l] = length[k] * factorial[k];
+            out[(size_t)k * (size_t)st->links + (size_t)l] = length[k] * morph_factorial[k];
     }
 }

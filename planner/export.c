@@ -70,6 +70,9 @@ static morph_status rebuild(const morph_record *r, rebuilt *b) {
                                      .links = r->links,
                                      .posts = r->posts,
                                      .link = r->link,
+                                     .length_limit = r->length_limit,
+                                     .fixed_count = r->fixed_count,
+                                     .fixed = r->fixed,
                                      .post = r->post,
                                      .post_length = r->post_length};
     b->timing =
@@ -88,6 +91,8 @@ static morph_status rebuild(const morph_record *r, rebuilt *b) {
     if (!b->curve->s || !b->curve->pose) return MORPH_ERR_NOMEM;
     memcpy(b->curve->s, r->path_s, poses * sizeof(double));
     memcpy(b->curve->pose, r->path_poses, poses * width * sizeof(double));
+    const morph_status held = morph_hold_create(&b->structure, &b->curve->hold);
+    if (held != MORPH_OK) return held;
     return morph_spline_fit(b->curve->s, b->curve->pose, r->poses, r->pose_width, &b->curve->spline);
 }
 

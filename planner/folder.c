@@ -7,6 +7,7 @@
 #include "planner/report.h"
 #include "planner/schedule_file.h"
 #include "planner/sha256.h"
+#include "planner/start.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -97,8 +98,8 @@ static morph_status put_schedule(const job *j, const char *plan_hash) {
 
 /* Name of the target's copy: its own, but never that of a file of ours. */
 static morph_status name_mesh(job *j) {
-    static const char *const taken[] = {"plan.h5",      "scene.yaml",    "summary.json",
-                                        "schedule.csv", "schedule.json", "report.html"};
+    static const char *const taken[] = {"plan.h5",       "scene.yaml",  "summary.json", "schedule.csv",
+                                        "schedule.json", "report.html", "start.csv"};
     const morph_target_def *def = &j->scene->target_def;
     if ((def->shape != MORPH_SHAPE_MESH && def->shape != MORPH_SHAPE_HEIGHTMAP) || !def->file)
         return MORPH_OK;
@@ -142,8 +143,17 @@ static morph_status put_scene(job *j) {
         if (status == MORPH_OK) status = put_sibling(j);
         if (status != MORPH_OK) return status;
     }
+    static char start_name[] = "start.csv";
+    morph_scene scene = *j->scene; /* borrows; only its start's name differs */
     char *yaml = NULL;
-    status = morph_scene_to_yaml(j->scene, j->mesh, &yaml);
+    if (scene.start.file) {
+        char *csv = NULL;
+        status = morph_start_to_csv(&scene.start, &csv);
+        status = put_text(j, start_name, status, csv);
+        scene.start.as_written = start_name;
+        if (status != MORPH_OK) return status;
+    }
+    status = morph_scene_to_yaml(&scene, j->mesh, &yaml);
     return put_text(j, "scene.yaml", status, yaml);
 }
 

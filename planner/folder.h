@@ -34,6 +34,10 @@ morph_status morph_folder_verify(const char *folder, const morph_record *record,
 morph_status morph_schedule_read(const char *file, int links, double **time, double **length, int *samples,
                                  char *message, size_t size);
 
+/* The same with at least `least` rows instead of two. */
+morph_status morph_schedule_read_rows(const char *file, int links, int least, double **time, double **length,
+                                      int *samples, char *message, size_t size);
+
 /* Pieces, for tests. */
 morph_status morph_record_write_h5(const morph_record *record, const char *file, char *message, size_t size);
 morph_status morph_record_read_h5(const char *file, morph_record *record, char *message, size_t size);

@@ -8,6 +8,7 @@
 typedef enum against_kind {
     AGAINST_LONGEST,
     AGAINST_SHORTEST,
+    AGAINST_STUCK,
     AGAINST_LINK_POST,
     AGAINST_LINK_LINK,
     AGAINST_CLEARANCE,
@@ -48,7 +49,9 @@ static void weigh_row(weigher *w, int block, int row, double multiplier) {
     candidate c = {.strength = fabs(multiplier), .block = block, .row = row, .least = multiplier < 0.0};
     const double bound = multiplier < 0.0 ? b->lower[row] : b->upper[row];
     if (strcmp(b->name, "length") == 0) {
-        c.kind = c.least ? AGAINST_SHORTEST : AGAINST_LONGEST;
+        c.kind = b->lower[row] == b->upper[row] ? AGAINST_STUCK
+                 : c.least                      ? AGAINST_SHORTEST
+                                                : AGAINST_LONGEST;
         c.strength *= 2.0 * sqrt(fmax(0.0, bound));
     } else if (strcmp(b->name, "angle") == 0) {
         const morph_angle_rows *rows = b->data;
@@ -85,6 +88,9 @@ static void describe(const weigher *w, const candidate *c, char *text, size_t si
     case AGAINST_LONGEST:
     case AGAINST_SHORTEST:
         snprintf(text, size, "length of %s (at its %s)", element, c->least ? "shortest" : "longest");
+        return;
+    case AGAINST_STUCK: /* which way it would have to go */
+        snprintf(text, size, "length of %s (stuck, too %s)", element, c->least ? "long" : "short");
         return;
     case AGAINST_LINK_POST:
     case AGAINST_LINK_LINK:

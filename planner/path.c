@@ -75,6 +75,7 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
         const double *frame = &guide->x[(size_t)at_frame * (size_t)n];
         for (int i = 0; i < n; i++) {
             double at = frame[i] + bend * (end[i] - last[i]);
+            if (p->options->bent) at += (1.0 - bend) * (start[i] - guide->x[i]);
             if (k == 0) at = start[i];
             if (k == p->count - 1) at = end[i];
             pose(p, k)[i] = at / a;
@@ -99,9 +100,11 @@ static void set_stations(pather *p, const morph_trajectory *guide, const double 
     }
 }
 
-/* Full inset away from the end, down to the end's own over the last quarter of the way. */
+/* Full inset away from the end, down to the end's own over the last quarter of the way; and from a bent
+ * start, which stands as near to its limits as the end that it was. */
 static morph_inset inset_at(const pather *p, double s, double factor) {
-    const double f = factor * fmin(1.0, (1.0 - s) / 0.25);
+    const double near = p->options->bent ? fmin(s, 1.0 - s) : 1.0 - s;
+    const double f = factor * fmin(1.0, near / 0.25);
     const morph_inset *e = &p->options->end, *i = &p->options->interior;
     return (morph_inset){e->length + f * (i->length - e->length), e->angle + f * (i->angle - e->angle),
                          e->clearance + f * (i->clearance - e->clearance), e->self + f * (i->self - e->self)};

@@ -21,6 +21,7 @@ typedef struct morph_path_options {
     double seconds;        /* wall; <= 0: none */
     bool refine;           /* false: the guide's poses as they are, nothing solved (the pure blanket) */
     int fine;              /* points examined per interval */
+    bool bent;             /* the start is a shape of its own, not where the guide begins */
     bool smooth;           /* with refine false: smoothed, which takes no solve either */
     const morph_control *control;
 } morph_path_options;

@@ -1,6 +1,7 @@
 #include "planner/plan_internal.h"
 
 #include "planner/reach_text.h"
+#include "planner/start.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -221,6 +222,11 @@ static void describe(morph_planner *p) {
              : p->options->method == MORPH_METHOD_NLOPT ? "nlopt"
                                                         : "ipopt");
     snprintf(s->level, sizeof s->level, "standard");
+    const morph_start *start = &p->scene->start;
+    snprintf(s->start.kind, sizeof s->start.kind, "%s", morph_start_name(start->kind));
+    s->start.residual = start->residual;
+    s->start.doubt = start->doubt;
+    s->start.free_motions = start->free_motions;
     s->target_volume = p->scene->target_report.volume;
     s->spacing = p->scene->structure.spacing;
     snprintf(s->blas, sizeof s->blas, "%s", morph_blas_name());

@@ -41,6 +41,7 @@ typedef struct morph_workspace {
     morph_cavity *cavity;
     morph_world world;
     double *start; /* 3*joints: flat, at the drop height above the target or in its frame */
+    double *begin; /* 3*joints: where the refined path starts: as start, or the scene's own start put there */
     morph_sdf_accuracy accuracy;
 } morph_workspace;
 morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,

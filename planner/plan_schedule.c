@@ -126,8 +126,10 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
     o.intervals = intervals;
     morph_curve *curve = NULL;
     morph_path_report r;
-    const morph_status status =
-        morph_path_plan(&p->work.world, p->way, p->work.start, p->end, &o, &curve, &r);
+    /* The other methods' ways are the blanket's, which falls from flat. */
+    o.bent = p->scene->start.pose && p->options->method == MORPH_METHOD_IPOPT;
+    const morph_status status = morph_path_plan(
+        &p->work.world, p->way, o.bent ? p->work.begin : p->work.start, p->end, &o, &curve, &r);
     morph_summary *s = &p->plan->summary;
     s->iterations_path += r.effort.iterations;
     s->linear_seconds += r.effort.linear_seconds;

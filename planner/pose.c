@@ -106,6 +106,10 @@ static void note(examiner *e, morph_limit limit, double amount,
     name(e->world->structure, element, v->element[limit], sizeof v->element[limit]);
 }
 
+/* A solve meets an equality to its tolerance, not to rounding, as it does for posts; the curve through the
+ * poses holds such a link exactly (planner/hold.h) and moves nothing by more than this. Spacings. */
+static const double HELD_SLACK = 5e-7;
+
 static void examine_members(examiner *e) {
     const morph_structure *s = e->world->structure;
     for (int p = 0; p < s->posts; p++) {
@@ -117,7 +121,8 @@ static void examine_members(examiner *e) {
         const double lo = s->length_limit[l][0] / s->spacing - length,
                      hi = length - s->length_limit[l][1] / s->spacing;
         const double beyond = lo > hi ? lo : hi;
-        note(e, MORPH_LIMIT_LENGTH, beyond, morph_link_name, l);
+        const bool held = s->length_limit[l][0] == s->length_limit[l][1];
+        note(e, MORPH_LIMIT_LENGTH, held ? beyond - HELD_SLACK : beyond, morph_link_name, l);
         if (e->active && !e->active->has_link[l] && beyond > -e->inset->length - e->near->length) {
             e->active->has_link[l] = true;
             e->active->link[e->active->links++] = l;

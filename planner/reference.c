@@ -22,6 +22,7 @@ morph_status morph_reference_structure(const morph_structure *s, morph_structure
         def.length[kind][0] = fmin(def.length[kind][0], MORPH_REFERENCE_SHORTEST * unit);
         def.length[kind][1] = fmax(def.length[kind][1], MORPH_REFERENCE_LONGEST * unit);
     }
+    def.stuck_links = 0;
     double *const angle[2] = {def.link_post, def.link_link};
     for (int k = 0; k < 2; k++) {
         angle[k][0] = fmin(angle[k][0], MORPH_REFERENCE_ANGLE);

@@ -55,6 +55,25 @@ typedef struct morph_motion_def {
  */
 typedef enum morph_attractors { MORPH_ATTRACT_AUTO, MORPH_ATTRACT_NONE, MORPH_ATTRACT_LIST } morph_attractors;
 
+typedef enum morph_start_kind {
+    MORPH_START_FLAT,
+    MORPH_START_PLAN,    /* end pose of a plan folder */
+    MORPH_START_LENGTHS, /* shape from measured lengths */
+    MORPH_START_POSE     /* joints from a file */
+} morph_start_kind;
+
+/* Where the plan starts; see planner/start.h. Zeroed is flat. */
+typedef struct morph_start {
+    morph_start_kind kind;
+    char *file, *as_written; /* as found; as the scene says it */
+    int joints, links;
+    double *pose;     /* 3*joints, m, wherever the file has it; NULL: flat */
+    double *length;   /* links: as measured; NULL but for lengths */
+    double residual;  /* largest |length of the pose - as measured|, m */
+    double doubt;     /* how far another shape of these lengths was found to lie, m; NaN: none looked for */
+    int free_motions; /* that lengths leave in this pose */
+} morph_start;
+
 typedef struct morph_scene {
     char *file; /* path of the scene */
     char *title;
@@ -64,6 +83,7 @@ typedef struct morph_scene {
     double base; /* NaN: none */
     morph_motion_def motion;
     morph_attractors attractors;
+    morph_start start;
     morph_goal goal;   /* 0 where not asked for */
     double duration;   /* s; 0: auto */
     double sample;     /* s */
@@ -73,6 +93,7 @@ typedef struct morph_scene {
     morph_hand *touch;       /* touches */
     morph_attractor *centre; /* centres, of MORPH_ATTRACT_LIST */
     int (*fixed_node)[2];    /* structure.fixed_nodes: structure.fixed as a list of nodes (i, j), each once */
+    int *stuck_link;         /* structure.stuck_links: structure.link.stuck, each once */
 } morph_scene;
 
 /* Where faults go: one line each, "FILE:LINE: key: what is wrong, what is allowed". */

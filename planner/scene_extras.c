@@ -1,9 +1,11 @@
-/* Lists of hands and centres, the goal; and sections whose features come later: read and validated, then
- * refused by name, so that nothing that a scene asks for is silently left out. */
+/* Lists of hands and centres, the start, the goal. */
 #include "planner/scene_parts.h"
+#include "planner/start.h"
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 static const morph_range force_range = {-MORPH_SCENE_LARGEST, MORPH_SCENE_LARGEST, false, "N"};
 static const morph_range moment_range = {0.0, 3600.0, false, "s"};
@@ -116,15 +118,39 @@ static void read_attractors(morph_scene_reader *r, const morph_value *root) {
     }
 }
 
-static void read_start(const morph_value *root) {
-    const morph_value start = morph_value_get(root, "start");
-    char *text = NULL;
-    if (morph_value_text(&start, 4000, &text) != MORPH_FOUND) return;
-    free(text);
-    if (morph_value_is(&start, "flat")) return;
-    char is[80];
-    morph_value_describe(&start, is, sizeof is);
-    morph_value_later(&start, is);
+/* flat, or a folder or file, found from the scene's folder. */
+static void read_start(morph_scene_reader *r, const morph_value *root) {
+    const morph_value value = morph_value_get(root, "start");
+    morph_start *start = &r->scene->start;
+    if (morph_value_text(&value, 4000, &start->as_written) != MORPH_FOUND) return;
+    if (morph_value_is(&value, "flat")) return;
+    const char *written = start->as_written, *scene = r->scene->file, *slash = strrchr(scene, '/');
+    const size_t folder = written[0] != '/' && slash ? (size_t)(slash - scene) + 1 : 0;
+    start->file = malloc(folder + strlen(written) + 1);
+    if (!start->file) {
+        r->yaml.faults.nomem = true;
+        return;
+    }
+    memcpy(start->file, scene, folder);
+    strcpy(start->file + folder, written);
+    if (access(start->file, F_OK) != 0)
+        morph_value_fault(&value, "%s is not there, allowed: flat, a plan folder, a CSV of lengths",
+                          start->file);
+}
+
+morph_status morph_scene_build_start(morph_scene_reader *r, const morph_value *root) {
+    const morph_value value = morph_value_get(root, "start");
+    morph_start *start = &r->scene->start;
+    char message[1200];
+    if (!start->file) return MORPH_OK;
+    const morph_status status = morph_start_read(&r->scene->structure, start, message, sizeof message);
+    if (status == MORPH_ERR_INPUT && message[0]) morph_value_fault(&value, "%s", message);
+    if (status == MORPH_OK && start->kind == MORPH_START_LENGTHS && start->free_motions > 0)
+        morph_value_warn(&value,
+                         "these lengths leave %d free motions: the shape is one of many (another was found "
+                         "%.3g m away), and the structure may stand in one that is not planned from",
+                         start->free_motions, start->doubt);
+    return status;
 }
 
 static void read_goal(morph_scene_reader *r, const morph_value *root) {
@@ -142,6 +168,6 @@ static void read_goal(morph_scene_reader *r, const morph_value *root) {
 
 void morph_scene_read_extras(morph_scene_reader *r, const morph_value *root) {
     read_attractors(r, root);
-    read_start(root);
+    read_start(r, root);
     read_goal(r, root);
 }

@@ -44,6 +44,10 @@ void morph_scene_read_extras(morph_scene_reader *r, const morph_value *root);
  * fault; other failures are handed on. */
 morph_status morph_scene_build_target(morph_scene_reader *r, const morph_value *root);
 
+/* Reads what the start names, once the structure is known to be good; faults stand at start. Failures as
+ * above. */
+morph_status morph_scene_build_start(morph_scene_reader *r, const morph_value *root);
+
 /* The whole reading but for the file: bytes[size] are the file's. As morph_scene_read. */
 morph_status morph_scene_parse(const char *path, const char *bytes, size_t size, morph_fault_sink fault,
                                morph_fault_sink warn, void *user, morph_scene **out);

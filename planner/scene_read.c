@@ -1,6 +1,7 @@
 /* A scene from a file: the parts together, the short sections, and how faults leave. */
 #include "planner/scene_parts.h"
 #include "planner/sha256.h"
+#include "planner/start.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -151,6 +152,7 @@ static morph_status parse(morph_scene_reader *r, const char *path, const char *b
     const morph_value root = morph_yaml_root(&r->yaml);
     read_all(r, &root);
     if (r->target_known && !r->yaml.faults.nomem) status = morph_scene_build_target(r, &root);
+    if (status == MORPH_OK && r->yaml.faults.count == 0) status = morph_scene_build_start(r, &root);
     return status;
 }
 
@@ -218,6 +220,8 @@ void morph_scene_destroy(morph_scene *scene) {
     free(scene->touch);
     free(scene->centre);
     free(scene->fixed_node);
+    free(scene->stuck_link);
+    morph_start_free(&scene->start);
     free(scene);
 }
 

@@ -1,4 +1,5 @@
 /* The structure section: the grid, its links and their limits. */
+#include "planner/hold.h"
 #include "planner/scene_parts.h"
 
 #include <stdio.h>
@@ -135,8 +136,8 @@ static void read_lengths(morph_scene_reader *r, const morph_value *link) {
     }
 }
 
-/* force and stuck: understood, not available yet. */
-static void read_later_link_keys(morph_scene_reader *r, const morph_value *link) {
+/* force: understood, not available yet. */
+static void read_later_link_keys(const morph_value *link) {
     const morph_value force = morph_value_get(link, "force");
     double pair[2];
     if (morph_value_pair(&force, &force_range, pair) == MORPH_FOUND) {
@@ -146,7 +147,11 @@ static void read_later_link_keys(morph_scene_reader *r, const morph_value *link)
         else
             morph_value_later(&force, "limits of push and pull");
     }
+}
 
+/* The list of links that hold their start length; each once, since a second time is a slip. */
+static void read_stuck(morph_scene_reader *r, const morph_value *link) {
+    morph_scene *scene = r->scene;
     const morph_value stuck = morph_value_get(link, "stuck");
     if (!stuck.node) return;
     if (!morph_value_is_list(&stuck)) {
@@ -156,14 +161,34 @@ static void read_later_link_keys(morph_scene_reader *r, const morph_value *link)
         return;
     }
     const long links = r->nodes_known && r->layout_known ? morph_link_count(&r->scene->structure) : 1000000L;
-    bool good = true;
-    for (int i = 0; i < morph_value_count(&stuck); i++) {
+    const int count = morph_value_count(&stuck);
+    if (count > MORPH_HOLD_MOST) {
+        morph_value_fault(&stuck, "a list of %d, allowed: at most %d links", count, MORPH_HOLD_MOST);
+        return;
+    }
+    int line[MORPH_HOLD_MOST], used = 0;
+    scene->stuck_link = morph_alloc((size_t)count, sizeof *scene->stuck_link);
+    if (!scene->stuck_link) {
+        r->yaml.faults.nomem = true;
+        return;
+    }
+    for (int i = 0; i < count; i++) {
         const morph_value item = morph_value_item(&stuck, i);
         long number;
-        if (morph_value_integer(&item, 0, links - 1, &number) != MORPH_FOUND) good = false;
+        if (morph_value_integer(&item, 0, links - 1, &number) != MORPH_FOUND) continue;
+        int before = 0;
+        while (before < used && scene->stuck_link[before] != (int)number)
+            before++;
+        if (before < used) {
+            morph_value_fault(&item, "%ld is given twice, first in line %d, allowed: once", number,
+                              line[before]);
+            continue;
+        }
+        line[used] = item.line;
+        scene->stuck_link[used++] = (int)number;
     }
-    if (good && morph_value_count(&stuck) > 0)
-        morph_value_later(&stuck, "links that hold their start length");
+    scene->structure.stuck_links = used;
+    scene->structure.stuck_link = used > 0 ? scene->stuck_link : NULL;
 }
 
 /* Least distance of two links' axes at the flat start, with s the spacing and h the thickness. Parallel links
@@ -207,7 +232,8 @@ static void read_link(morph_scene_reader *r, const morph_value *structure) {
     read_number(&link, "jerk", &jerk_range, &def->jerk);
     read_number(&link, "stiffness", &stiffness_range, &def->stiffness);
     read_number(&link, "damping", &damping_range, &def->damping);
-    read_later_link_keys(r, &link);
+    read_later_link_keys(&link);
+    read_stuck(r, &link);
 
     check_room(r, structure, &link);
 }

@@ -1,5 +1,6 @@
 /* Which scenes a method can plan. */
 #include "planner/scene_parts.h"
+#include "planner/start.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -30,6 +31,11 @@ static bool beyond_refinement(const morph_scene *scene, char *text, size_t size)
 bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size) {
     char feature[96];
     if (size > 0) text[0] = '\0';
+    if (strcmp(method, "ipopt") != 0 && scene->start.file) {
+        snprintf(text, size, "not available yet: start: %s with --method %s",
+                 morph_start_name(scene->start.kind), method);
+        return false;
+    }
     if (strcmp(method, "blanket") == 0 || !beyond_refinement(scene, feature, sizeof feature)) return true;
     snprintf(text, size, "not available yet: %s with --method %s", feature, method);
     return false;

@@ -128,7 +128,10 @@ static void put_structure(buffer *b, const morph_structure_def *def) {
     put_number(b, "    jerk", def->jerk);
     put_number(b, "    stiffness", def->stiffness);
     put_number(b, "    damping", def->damping);
-    put(b, "    stuck: []\n");
+    put(b, "    stuck: [");
+    for (int k = 0; k < def->stuck_links; k++)
+        put(b, "%s%d", k ? ", " : "", def->stuck_link[k]);
+    put(b, "]\n");
     put(b, "  angle:\n");
     put_numbers(b, "    link_post", def->link_post, 2, true);
     put_numbers(b, "    link_link", def->link_link, 2, true);
@@ -240,7 +243,10 @@ static bool put_scene(buffer *b, const morph_scene *scene, const char *mesh_file
         put_number(b, "base", scene->base);
     put_motion(b, scene);
     put_attractors(b, scene);
-    put(b, "start: flat\n");
+    if (!scene->start.file)
+        put(b, "start: flat\n");
+    else if (!put_text(b, "start", scene->start.as_written))
+        return false;
     put_goal(b, &scene->goal);
     put(b, "schedule:\n");
     if (scene->duration > 0.0)

@@ -10,6 +10,7 @@
 typedef struct csv {
     const char *file;
     char *at, *end; /* what is left */
+    int least;      /* rows wanted */
     int line;       /* of the row in hand, from 1 */
     char *row;      /* the row in hand, ends in 0 */
     char *message;
@@ -121,10 +122,12 @@ static morph_status read_rows(csv *c, int links, double *time, double *length, i
         }
         morph_status status = read_row(c, links, &time[n], length + (size_t)n * (size_t)links);
         if (status != MORPH_OK) return status;
-        if (n > 0 && time[n] <= time[n - 1]) return fault(c, "time does not increase", NULL);
+        if (n > 0 && time[n] <= time[n - 1]) return fault(c, "column 1: time does not increase", NULL);
         n++;
     }
-    if (n < 2) return fault(c, "at least two samples are needed", NULL);
+    if (n < c->least)
+        return fault(c, c->least > 1 ? "at least two samples are needed" : "at least one row is needed",
+                     NULL);
     *samples = n;
     return MORPH_OK;
 }
@@ -154,6 +157,11 @@ static morph_status parse(csv *c, int links, double **time, double **length, int
 
 morph_status morph_schedule_read(const char *file, int links, double **time, double **length, int *samples,
                                  char *message, size_t size) {
+    return morph_schedule_read_rows(file, links, 2, time, length, samples, message, size);
+}
+
+morph_status morph_schedule_read_rows(const char *file, int links, int least, double **time, double **length,
+                                      int *samples, char *message, size_t size) {
     *time = NULL;
     *length = NULL;
     *samples = 0;
@@ -170,7 +178,12 @@ morph_status morph_schedule_read(const char *file, int links, double **time, dou
     }
     /* Spreadsheets put a byte order mark first. */
     size_t mark = total >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
-    csv c = {.file = file, .at = text + mark, .end = text + total, .message = message, .size = size};
+    csv c = {.file = file,
+             .least = least,
+             .at = text + mark,
+             .end = text + total,
+             .message = message,
+             .size = size};
     status = parse(&c, links, time, length, samples);
     morph_locale_leave(&locale);
     free(text);

@@ -283,6 +283,16 @@ static void put_details(builder *b, cJSON *root, const morph_summary *s) {
     put_text(b, root, "warning", s->warning);
 }
 
+static void put_start(builder *b, cJSON *root, const morph_summary *s) {
+    cJSON *start = put_object(b, root, "start");
+    const bool flat = strcmp(s->start.kind, "flat") == 0 || !s->start.kind[0];
+    put_text(b, start, "kind", flat ? "flat" : s->start.kind);
+    if (flat) return;
+    put_number(b, start, "residual", s->start.residual);
+    put_number(b, start, "free_motions", s->start.free_motions);
+    put_number(b, start, "doubt_m", s->start.doubt);
+}
+
 static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_text(b, root, "title", s->title);
     put_text(b, root, "scene", s->scene);
@@ -292,6 +302,7 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_bool(b, root, "feasible", s->feasible);
     put_text(b, root, "reason", s->reason);
     put_number(b, root, "spacing", s->spacing);
+    put_start(b, root, s);
     put_measures(b, root, s);
     put_cavities(b, root, s);
     put_reach(b, root, &s->reach);

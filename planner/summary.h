@@ -49,6 +49,11 @@ typedef struct morph_cavity_list {
 typedef struct morph_summary {
     char title[128], scene[256], method[16], level[16];
     char outcome[16];
+    struct {
+        char kind[16]; /* "flat", "plan", "lengths", "pose" */
+        double residual, doubt;
+        int free_motions;
+    } start; /* as morph_start; numbers only where it is not flat */
     bool feasible;
     char reason[512]; /* why not feasible: constraint, element, time, amount; else empty */
     bool has_plan, has_blanket;

@@ -1,6 +1,7 @@
 #include "planner/text.h"
 
 #include "planner/reach_text.h"
+#include "planner/start.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -142,6 +143,25 @@ static void limit_lines(FILE *out, const morph_structure *s) {
             in_degrees(d->link_link[0]), in_degrees(d->link_link[1]));
 }
 
+static void stuck_lines(FILE *out, const morph_structure *s) {
+    for (int k = 0; k < s->def.stuck_links; k++) {
+        char name[64];
+        const int l = s->def.stuck_link[k];
+        morph_link_name(s, l, name, sizeof name);
+        fprintf(out, "stuck      %s holds %.9g m\n", name, s->length_limit[l][0]);
+    }
+}
+
+static void start_lines(FILE *out, const morph_start *start) {
+    if (start->kind == MORPH_START_FLAT) return;
+    fprintf(out, "start      %s (%s): %d free motions there", start->as_written,
+            morph_start_name(start->kind), start->free_motions);
+    if (start->kind == MORPH_START_LENGTHS)
+        fprintf(out, "; lengths met to %.3g m, another shape of them found %.3g m away", start->residual,
+                start->doubt);
+    fprintf(out, "\n");
+}
+
 static void mobility_lines(FILE *out, const morph_structure *s, const morph_mobility *m) {
     fprintf(out,
             "mobility   flat: %d free motions, %d redundant rows (rank %d of %d rows: links%s%s), least "
@@ -172,6 +192,8 @@ char *morph_info_text(const morph_scene *scene, const morph_structure *s, const 
     fprintf(out, "scene      %s\n", scene->title && scene->title[0] ? scene->title : scene->file);
     structure_lines(out, s);
     limit_lines(out, s);
+    stuck_lines(out, s);
+    start_lines(out, &scene->start);
     mobility_lines(out, s, m);
     target_lines(out, &scene->target_report);
     morph_reach_lines(out, reach);

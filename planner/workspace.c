@@ -1,18 +1,21 @@
 #include "planner/plan.h"
 
+#include "planner/start.h"
+
 #include <stdlib.h>
+#include <string.h>
 
 /* Box of everything the distance field must know: the flat structure with room to swing, the target, the base
  * plane. */
-static void field_box(const morph_scene *scene, const morph_structure *s, const double *start, double lo[3],
-                      double hi[3]) {
+static void field_box(const morph_scene *scene, const morph_structure *s, const morph_workspace *w,
+                      double lo[3], double hi[3]) {
     const morph_mesh_report *t = &scene->target_report;
     const double a = s->spacing;
     for (int k = 0; k < 3; k++) {
-        lo[k] = hi[k] = start[k];
+        lo[k] = hi[k] = w->start[k];
         for (int j = 0; j < s->joints; j++) {
-            lo[k] = fmin(lo[k], start[3 * j + k]);
-            hi[k] = fmax(hi[k], start[3 * j + k]);
+            lo[k] = fmin(lo[k], fmin(w->start[3 * j + k], w->begin[3 * j + k]));
+            hi[k] = fmax(hi[k], fmax(w->start[3 * j + k], w->begin[3 * j + k]));
         }
         lo[k] = fmin(lo[k], t->lo[k]) - a;
         hi[k] = fmax(hi[k], t->hi[k]) + a;
@@ -29,6 +32,17 @@ double morph_scene_start_height(const morph_scene *scene) {
     return fmax(top - scene->motion.height, base) + scene->structure.radius + 2e-3 * scene->structure.spacing;
 }
 
+/* Where the path begins; stuck links then hold the length that they have there. */
+static morph_status place_begin(const morph_scene *scene, morph_workspace *w) {
+    const size_t n = 3 * (size_t)w->structure->joints;
+    w->begin = morph_alloc(n, sizeof *w->begin);
+    if (!w->begin) return MORPH_ERR_NOMEM;
+    memcpy(w->begin, w->start, n * sizeof *w->begin);
+    if (!scene->start.pose) return MORPH_OK;
+    morph_start_hold(&scene->start, w->structure);
+    return morph_start_place(&scene->start, w->start, w->begin);
+}
+
 morph_status morph_workspace_create(const morph_scene *scene, const morph_control *control,
                                     morph_workspace *w) {
     *w = (morph_workspace){0};
@@ -42,10 +56,11 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
         const double height = morph_scene_start_height(scene);
         for (int i = 0; i < 3 * s->joints; i++)
             w->start[i] = s->start[i] + (i % 3 == 2 ? height : 0.0);
+        status = place_begin(scene, w);
     }
     if (status == MORPH_OK && !scene->target_def.has_deformable) {
         double lo[3], hi[3];
-        field_box(scene, s, w->start, lo, hi);
+        field_box(scene, s, w, lo, hi);
         /* A sixteenth of the spacing is about the links' radius; beyond 2.5 million nodes memory and time
          * outgrow the gain: the rows' bias makes up for what a coarser field misses. */
         const double volume = (hi[0] - lo[0]) * (hi[1] - lo[1]) * (hi[2] - lo[2]);
@@ -73,9 +88,11 @@ morph_status morph_workspace_press(morph_workspace *w, const morph_scene *scene,
     morph_status status = morph_mesh_examine(surface, &pressed.target_report);
     if (status == MORPH_OK) status = morph_workspace_create(&pressed, control, &fresh);
     if (status != MORPH_OK) return status;
-    double *start = fresh.start;
+    double *start = fresh.start, *begin = fresh.begin;
     fresh.start = w->start;
+    fresh.begin = w->begin;
     w->start = start;
+    w->begin = begin;
     morph_workspace_free(w);
     *w = fresh;
     return MORPH_OK;
@@ -87,6 +104,7 @@ void morph_workspace_free(morph_workspace *w) {
     morph_distance_destroy(w->exact);
     morph_structure_destroy(w->structure);
     free(w->start);
+    free(w->begin);
     *w = (morph_workspace){0};
 }
 

@@ -279,9 +279,8 @@ beyond_key motion mode rise
 with_key target deformable '{young: 2.0e4, density: 300}'
 later target.deformable plan "$work/later.yaml"
 read_key structure support frame
+read_key link stuck '[3, 4]'
 read_key motion touch '[{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}]'
 read_key '' attractors '[{at: [0, 0, 0], strength: 1.0}]'
 later_key link force '[-50, 50]'
-later_key link stuck '[3, 4]'
-later_key '' start other.plan
 read_key '' goal '{mean_gap: 0.01}'

@@ -162,8 +162,8 @@ static const bad_case cases[] = {
     {7, "    stuck: 3", 7, "structure.link.stuck", "3, allowed: a list of link numbers"},
     {7, "    stuck: [0, 62]", 7, "structure.link.stuck[1]",
      "62 is too large, allowed: a whole number from 0 to 61"},
-    {7, "    stuck: [62]\n  bracing: web", 7, "structure.link.stuck",
-     "not available yet: structure.link.stuck: "},
+    {7, "    stuck: [4, 5,\n      4]", 8, "structure.link.stuck[2]", "4 is given twice, first in line 7"},
+    {7, "    stuck: [1.5]", 7, "structure.link.stuck[0]", "1.5 is no whole number"},
     {7, "    stuck: [93]\n  bracing: web", 7, "structure.link.stuck[0]", "a whole number from 0 to 92"},
     {7, "    stuck: [-1]", 7, "structure.link.stuck[0]", "-1 is too small"},
     /* angles */
@@ -302,8 +302,7 @@ static const bad_case cases[] = {
     {20, "  samples: 1", 20, "schedule.samples", "did you mean sample?"},
     /* understood, but of a later version */
     {7, "    force: [-50, 50]", 7, "structure.link.force", "not available yet: structure.link.force: "},
-    {7, "    stuck: [0, 61]", 7, "structure.link.stuck", "not available yet: structure.link.stuck: "},
-    {17, "start: other.plan", 17, "start", "not available yet: start: other.plan"},
+    {17, "start: no_such.plan", 17, "start", "no_such.plan is not there, allowed: flat, a plan folder"},
 };
 
 /* Each case has its one fault and no other. */

@@ -47,7 +47,8 @@ static const char good_text[] =
     "# and numbers whose digits may be others.\n"
     "morphplan: 1\n"
     "title: 'Every letter of this may be another one'\n"
-    "structure: {nodes: [4, 4], spacing: 0.1, bracing: web, fixed: [[0, 0], [3, 3], [1, 2]]}\n"
+    "structure: {nodes: [4, 4], spacing: 0.1, bracing: web, fixed: [[0, 0], [3, 3], [1, 2]],\n"
+    "  link: {stuck: [1, 2]}}\n"
     "target: {shape: box, size: [0.15, 0.15, 0.1]}\n"
     "motion:\n"
     "  touch: [{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0, to: 1.5}]\n"
@@ -130,8 +131,12 @@ static void try_text(const char *text, size_t size, int *scenes) {
     const int fixed = scene->structure.fixed_nodes;
     assert_int_equal(copy->structure.fixed_nodes, fixed);
     if (fixed > 0) assert_memory_equal(scene->fixed_node, copy->fixed_node, (size_t)fixed * sizeof(int[2]));
-    /* All but where the list of nodes stands. */
+    const int stuck = scene->structure.stuck_links;
+    assert_int_equal(copy->structure.stuck_links, stuck);
+    if (stuck > 0) assert_memory_equal(scene->stuck_link, copy->stuck_link, (size_t)stuck * sizeof(int));
+    /* All but where the lists of nodes and links stand. */
     scene->structure.fixed_node = copy->structure.fixed_node = NULL;
+    scene->structure.stuck_link = copy->structure.stuck_link = NULL;
     assert_memory_equal(&scene->structure, &copy->structure, sizeof scene->structure);
     morph_scene_destroy(copy);
     morph_scene_destroy(scene);
