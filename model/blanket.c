@@ -141,6 +141,12 @@ static int steps_per_frame(const morph_structure *s, const morph_blanket_def *de
     return steps <= MOST_STEPS ? (int)fmax(steps, 1.0) : 0;
 }
 
+/* Prescribed lengths that contradict limits throw joints about the faster the shorter the step is: there a
+ * frame takes no more steps than halving would come to. */
+static double most_steps(const morph_blanket_state *b) {
+    return b->def.drive ? fmin(ceil(b->def.frame / (LEAST_STEP * b->good_step)), MOST_STEPS) : MOST_STEPS;
+}
+
 /* More of them while the blanket is fast. */
 static int steps_for_speed(const morph_blanket_state *b, int steps) {
     double fastest = 0.0;
@@ -149,7 +155,7 @@ static int steps_for_speed(const morph_blanket_state *b, int steps) {
     const double spacing = b->structure->spacing;
     const bool fast = b->sdf && fastest * b->good_step > FAST * spacing;
     const double most = b->def.frame * fastest / ((fast ? FAST_MOVE : PLANNED_MOVE) * spacing);
-    return (int)fmin(fmax(steps, ceil(most)), MOST_STEPS);
+    return (int)fmax(steps, fmin(ceil(most), most_steps(b)));
 }
 
 /* One frame, redone with half the step while it fails. A pose that projection is still sorting out (a start
@@ -166,7 +172,7 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
     b->most_move = MOST_MOVE * b->structure->spacing;
     b->guard.refused = 0;
     bool good = advance(b, now, at->allowed);
-    while (!good && b->status == MORPH_OK && b->def.frame / now > least && now < MOST_STEPS / 2) {
+    while (!good && b->status == MORPH_OK && b->def.frame / now > least && now < most_steps(b) / 2) {
         now *= 2;
         report->step_halvings++;
         rewind_frame(b, at);

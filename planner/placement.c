@@ -305,13 +305,16 @@ static morph_status conclude(placer *p) {
     morph_trajectory still = {0};
     morph_status status = settle_down(p, &still);
     if (status == MORPH_OK) status = adopt(p, out->centre, out->centres, o.epsilon, &b, &rest);
-    if (status == MORPH_OK)
+    /* So little reach may leave contacts no room to close: then a little more. */
+    for (int k = 0; k < 2 && status == MORPH_OK && !out->solved; k++, o.last_reach *= 3.0) {
+        free(z);
+        morph_nlp_result_free(&result);
         status = proposal_of(&o)(p->w, b, &o, o.last_reach, time_left(p), &rest, &z, &result);
-    if (status == MORPH_OK) {
+        if (status != MORPH_OK) break;
         morph_effort_add(&out->effort, &result);
         out->solved = result.outcome == MORPH_OPTIMAL;
-        status = morph_balance_examine(b, z, &out->balance);
     }
+    if (status == MORPH_OK) status = morph_balance_examine(b, z, &out->balance);
     if (status == MORPH_OK) status = judge(p, b, z, &t);
     if (status == MORPH_OK) {
         out->predicted_objective = t.predicted;
