@@ -31,7 +31,7 @@ fi
 
 build_and_test() {
     mkdir -p "$1"
-    cmake -S . -B "$1" -G Ninja -DCMAKE_BUILD_TYPE="$2" -DMORPH_WERROR=ON >"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
+    cmake -S . -B "$1" -G Ninja -DCMAKE_BUILD_TYPE="$2" -DMORPH_WERROR=ON "-DMORPH_LONG=${MORPH_LONG:-OFF}" >"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
     cmake --build "$1" >>"$1/build.log" 2>&1 || { cat "$1/build.log"; exit 1; }
     echo "Built $1 ($2)"
     ctest --test-dir "$1" --output-on-failure --no-tests=error -j 2
