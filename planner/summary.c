@@ -188,7 +188,6 @@ static void put_solver(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, stage, "possible", s->rows_path_possible);
 }
 
-/* Everything that differs from run to run stands here and in peak_memory_bytes. */
 static void put_placement(builder *b, cJSON *root, const morph_summary *s) {
     const morph_placement_summary *p = &s->placement;
     cJSON *o = put_object(b, root, "placement");
@@ -208,6 +207,7 @@ static void put_placement(builder *b, cJSON *root, const morph_summary *s) {
     keep(b, cJSON_AddStringToObject(o, "reason", p->reason));
 }
 
+/* What differs from run to run stands here and in peak_memory_bytes alone. */
 static void put_seconds(builder *b, cJSON *root, const morph_summary *s) {
     if (s->budget > 0.0) {
         cJSON *budget = put_object(b, root, "budget");

@@ -9,43 +9,7 @@
 #include <cmocka.h>
 
 #include "model/cavity_section.h"
-
-#define assert_near(a, b, eps) near_or_fail((a), (b), (eps), __LINE__)
-static void near_or_fail(double a, double b, double eps, int line) {
-    if (fabs(a - b) <= eps) return;
-    print_error("line %d: %.17g is not %.17g to %g\n", line, a, b, eps);
-    fail();
-}
-
-/* A square sheet of SIDE x SIDE joints 0.1 m apart about the origin. */
-enum { SIDE = 9, JOINTS = SIDE * SIDE };
-typedef struct sheet {
-    morph_structure s;
-    double x[3 * JOINTS];
-    int skin[2 * JOINTS][3];
-} sheet;
-
-static sheet *sheet_make(double z) {
-    sheet *h = calloc(1, sizeof *h);
-    assert_non_null(h);
-    h->s.joints = JOINTS;
-    h->s.spacing = h->s.def.spacing = 0.1;
-    h->s.def.radius = 0.004;
-    h->s.skin = h->skin;
-    h->s.start = h->x;
-    for (int j = 0; j < SIDE; j++)
-        for (int i = 0; i < SIDE; i++) {
-            double *p = h->x + 3 * (j * SIDE + i);
-            p[0] = i * 0.1 - 0.4;
-            p[1] = j * 0.1 - 0.4;
-            p[2] = z;
-            if (i + 1 == SIDE || j + 1 == SIDE) continue;
-            const int a = j * SIDE + i, b = a + 1, c = a + SIDE + 1, d = a + SIDE;
-            memcpy(h->skin[h->s.skin_triangles++], (int[3]){a, b, c}, sizeof h->skin[0]);
-            memcpy(h->skin[h->s.skin_triangles++], (int[3]){a, c, d}, sizeof h->skin[0]);
-        }
-    return h;
-}
+#include "tests/support/cavity_sheet.h"
 
 static morph_cavity *over_mesh(const sheet *h, morph_mesh *mesh, bool closed, double up, double base,
                                morph_distance **d) {
