@@ -188,7 +188,7 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
         now = first;
         rewind_frame(b, at);
         b->most_move = INFINITY;
-        if (!advance(b, now, INFINITY)) return MORPH_ERR_NONFINITE;
+        if (!advance(b, now, INFINITY)) return b->status != MORPH_OK ? b->status : MORPH_ERR_NONFINITE;
         memset(b->v, 0, 3 * (size_t)b->joints * sizeof(double));
         if (b->soft) morph_blanket_soft_stop(b);
     }

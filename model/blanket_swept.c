@@ -305,7 +305,7 @@ bool morph_blanket_guard(morph_blanket_state *b) {
     b->guard.crossings++;
     if (++b->guard.refused > MOST_REFUSED || !isfinite(b->most_move)) {
         b->guard.through = crossed;
-        b->status = MORPH_ERR_NONFINITE;
+        b->status = MORPH_ERR_MOTION;
     }
     return false;
 }

@@ -44,6 +44,8 @@ static int exit_of(morph_status status) {
         return MORPH_EXIT_INPUT;
     case MORPH_ERR_STOPPED:
         return MORPH_EXIT_STOPPED;
+    case MORPH_ERR_MOTION:
+        return MORPH_EXIT_INFEASIBLE;
     case MORPH_ERR_NOMEM:
     case MORPH_ERR_NONFINITE:
     case MORPH_ERR_BACKEND:
@@ -54,10 +56,14 @@ static int exit_of(morph_status status) {
     return MORPH_EXIT_INTERNAL;
 }
 
-static int fail(const morph_job *job, const char *what, morph_status status) {
-    char line[256];
-    snprintf(line, sizeof line, "morphplan: %s: %s", what, morph_status_text(status));
+static void say_of(const morph_job *job, const char *what, const char *text) {
+    char line[768];
+    snprintf(line, sizeof line, "morphplan: %.240s: %s", what, text);
     say(job, line);
+}
+
+static int fail(const morph_job *job, const char *what, morph_status status) {
+    say_of(job, what, morph_status_text(status));
     return exit_of(status);
 }
 
@@ -172,12 +178,17 @@ static int write_beside(const morph_scene *scene, const char *folder, const morp
 static int plan_into(const morph_scene *scene, const char *folder, const morph_job *job, char **text,
                      char **json) {
     const morph_control control = {job->stop, job->progress, job->log, job->user};
+    char message[512] = "";
     const morph_plan_options options = {
         job->method && strcmp(job->method, "blanket") == 0 ? MORPH_METHOD_BLANKET
         : job->method && strcmp(job->method, "nlopt") == 0 ? MORPH_METHOD_NLOPT
                                                            : MORPH_METHOD_IPOPT,
-        &control, job->warning, NULL, job->budget};
-    char message[512] = "";
+        &control,
+        job->warning,
+        NULL,
+        job->budget,
+        message,
+        sizeof message};
     morph_status status = morph_folder_probe(folder, job->overwrite, message, sizeof message);
     if (status != MORPH_OK) {
         say(job, message);
@@ -185,6 +196,10 @@ static int plan_into(const morph_scene *scene, const char *folder, const morph_j
     }
     morph_plan *plan = NULL;
     status = morph_plan_run(scene, &options, &plan);
+    if (status != MORPH_OK && message[0]) {
+        say_of(job, scene->file, message);
+        return exit_of(status);
+    }
     if (status != MORPH_OK) return fail(job, scene->file, status);
     struct stat info;
     const bool beside = strcmp(plan->summary.outcome, "stopped") == 0 && lstat(folder, &info) == 0;

@@ -159,6 +159,9 @@ static morph_status stage_replay(morph_planner *p) {
     if (status == MORPH_ERR_NONFINITE) {
         morph_log(morph_planner_control(p), "replay: the lengths throw the structure about without bound");
         status = MORPH_OK;
+    } else if (status == MORPH_ERR_MOTION) {
+        morph_log(morph_planner_control(p), "replay: the lengths throw the structure through the target");
+        status = MORPH_OK;
     }
     morph_planner_time(p, MORPH_STAGE_REPLAY, since);
     return status;

@@ -21,6 +21,8 @@ typedef struct morph_plan_options {
     /* Centres that were placed for this scene already, with their run; NULL: the plan places its own. */
     const struct morph_placement *placement;
     double budget; /* s for the plan and its writing; 0: none. A feasible plan is sought first, then better */
+    char *message; /* why there is no plan, where more can be said than the status does; NULL */
+    size_t message_size;
 } morph_plan_options;
 
 typedef struct morph_plan {

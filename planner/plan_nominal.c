@@ -45,6 +45,23 @@ static void note_held_up(morph_planner *p) {
     morph_log(morph_planner_control(p), "nominal: %s", text);
 }
 
+/* Says where and when the motion would have come through the target: there is no plan then to say it in. */
+static void tell_came_through(const morph_planner *p) {
+    const morph_structure *st = p->work.structure;
+    const morph_blanket_report *r = &p->plan->summary.blanket_report;
+    char element[96];
+    if (!p->options->message) return;
+    if (r->through_element < st->links)
+        morph_link_name(st, r->through_element, element, sizeof element);
+    else
+        snprintf(element, sizeof element, "skin triangle %d", r->through_element - st->links);
+    snprintf(
+        p->options->message, p->options->message_size,
+        "clearance: %s would come through the target at %.4g s, however short the steps: a lower height or "
+        "gravity, or more radius, would let it be held",
+        element, r->through_time);
+}
+
 /* What the blanket has made of the target: later stages see that, as a rigid one. */
 static morph_status press(morph_planner *p, const morph_body *body) {
     morph_summary *s = &p->plan->summary;
@@ -101,6 +118,7 @@ morph_status morph_stage_nominal(morph_planner *p) {
             : morph_blanket_run(p->work.structure, p->work.sdf, p->work.exact, &def, p->work.start,
                                 morph_planner_control(p), &p->nominal, &s->blanket_report);
     const morph_structure *st = p->work.structure;
+    if (status == MORPH_ERR_MOTION) tell_came_through(p);
     if (p->nominal.frames > 0) status = morph_planner_ended(p, status, MORPH_STAGE_NOMINAL);
     if (status == MORPH_OK) status = morph_record_nominal(&p->plan->record, st, &p->nominal);
     if (status == MORPH_OK) {

@@ -85,7 +85,7 @@ morph_status morph_stage_placement(morph_planner *p) {
         placed = &own;
     }
     status = morph_planner_ended(p, status, MORPH_STAGE_PLACEMENT);
-    if (status == MORPH_ERR_NONFINITE || status == MORPH_ERR_BACKEND) {
+    if (status == MORPH_ERR_NONFINITE || status == MORPH_ERR_MOTION || status == MORPH_ERR_BACKEND) {
         morph_log(morph_planner_control(p), "placement: left out: %s", morph_status_text(status));
         status = MORPH_OK;
     }

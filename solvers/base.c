@@ -18,6 +18,8 @@ const char *morph_status_text(morph_status status) {
         return "unusable input";
     case MORPH_ERR_NONFINITE:
         return "a number is not finite";
+    case MORPH_ERR_MOTION:
+        return "a motion too fast to be followed";
     case MORPH_ERR_BACKEND:
         return "a library failed";
     case MORPH_ERR_IO:

@@ -13,6 +13,7 @@ typedef enum morph_status {
     MORPH_ERR_NOMEM,     /* memory refused; nothing is left behind */
     MORPH_ERR_INPUT,     /* the caller's data cannot be used; a message says which */
     MORPH_ERR_NONFINITE, /* a NaN or an infinity where a number must stand */
+    MORPH_ERR_MOTION,    /* a motion too fast to be followed, however short the steps */
     MORPH_ERR_BACKEND,   /* a library failed or threw */
     MORPH_ERR_IO,        /* a file cannot be read or written; errno is kept */
     MORPH_ERR_STOPPED,   /* the stop callback asked for it; results so far are kept where documented */

@@ -286,3 +286,16 @@ read_key motion touch '[{node: [1, 2], layer: top, force: [0, 0, -2], from: 1.0,
 read_key '' attractors '[{at: [0, 0, 0], strength: 1.0}]'
 later_key link force '[-50, 50]'
 read_key '' goal '{mean_gap: 0.01}'
+
+# --- a motion that no step is short enough for is refused by name, also when nothing else is to be said
+cat >"$work/wire.yaml" <<'SCENE'
+morphplan: 1
+structure: {nodes: [4, 4], spacing: 0.1, link: {stiffness: 20, radius: 0.0005}}
+target: {shape: capsule, radius: 0.0005, height: 0.5, rotate: [0, 90, 0], at: [0, 0, 0.2]}
+motion: {height: 1.0, gravity: 10000, time: 0.2, friction: 0.4}
+attractors: none
+SCENE
+expect 3 "$program" plan "$work/wire.yaml" --method blanket -o "$work/wire.plan" --quiet
+one_line
+says 'wire.yaml: clearance: .* would come through the target at 0\.0[0-9]* s'
+absent "$work" wire.plan
