@@ -28,9 +28,9 @@
 /* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
  * angle): half a degree, what the falling blanket's own frames keep. */
 #define ANGLE_GIVES 0.01
-/* A rising target is held up where its unpolished frame is deeper in the target than this, spacings: half a
- * link's usual radius. Sweeps that end when they move little leave a few 1e-3 of what the target pushes in a
- * step, with no limit near. */
+/* A rising target is held up where the unpolished frame is deeper in it than this, spacings, or a panel is
+ * bent by this sine: half a link's usual radius. Sweeps that end when they move little leave a few 1e-3 of
+ * what the target pushes in a step, with no limit near. */
 #define RAW_DEPTH 0.02
 /* What a target that was held up draws back by in a frame that still breaks a limit, spacings. */
 #define RETREAT 0.02
@@ -232,9 +232,9 @@ static void resisting(const morph_blanket_state *b, morph_blanket_report *report
         }
 }
 
-/* The limit that a pose breaks while the target rises, deeper than `depth` spacings in the target where it is
- * clearance; false if all hold. */
-static bool gives_way(const morph_blanket_state *b, const morph_violation *v, double depth,
+/* The limit that a pose breaks while the target rises, deeper than `depth` spacings in the target or a
+ * panel's sine beyond `bent`; false if all hold. */
+static bool gives_way(const morph_blanket_state *b, const morph_violation *v, double depth, double bent,
                       morph_blanket_report *report) {
     const double spacing = b->structure->spacing;
     report->held_element = -1;
@@ -246,7 +246,7 @@ static bool gives_way(const morph_blanket_state *b, const morph_violation *v, do
         report->held_element = v->tuple;
     } else if (v->clearance > depth * spacing)
         resisting(b, report);
-    else if (v->panel > MORPH_BLANKET_PANEL_HELD)
+    else if (v->panel > bent)
         report->held_by = MORPH_BLANKET_PANEL;
     else
         return false;
@@ -262,8 +262,8 @@ static bool rising(const morph_blanket_state *b) {
 static bool refused(const morph_blanket_state *b, const morph_violation *polished,
                     morph_blanket_report *report) {
     const morph_violation raw = morph_blanket_violation(b, b->x);
-    return gives_way(b, polished, MORPH_BLANKET_CLEARANCE_HELD, report) ||
-           (!b->held_up && gives_way(b, &raw, RAW_DEPTH, report));
+    return gives_way(b, polished, MORPH_BLANKET_CLEARANCE_HELD, MORPH_BLANKET_PANEL_HELD, report) ||
+           (!b->held_up && gives_way(b, &raw, RAW_DEPTH, RAW_DEPTH, report));
 }
 
 /* The frame done again from its start, and its record. */
