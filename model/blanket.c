@@ -28,6 +28,10 @@
 /* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
  * angle): half a degree, what the falling blanket's own frames keep. */
 #define ANGLE_GIVES 0.01
+/* A rising target is held up where the unpolished frame is deeper in it than this, spacings, or a panel is
+ * bent by this sine: half a link's usual radius. Sweeps that end when they move little leave a few 1e-3 of
+ * what the target pushes in a step, with no limit near. */
+#define RAW_DEPTH 0.02
 /* What a target that was held up draws back by in a frame that still breaks a limit, spacings. */
 #define RETREAT 0.02
 /* Then a little more each time the frame is done again, at most this often. */
@@ -228,8 +232,10 @@ static void resisting(const morph_blanket_state *b, morph_blanket_report *report
         }
 }
 
-/* The limit that a pose breaks while the target rises; false if all hold. */
-static bool gives_way(const morph_blanket_state *b, const morph_violation *v, morph_blanket_report *report) {
+/* The limit that a pose breaks while the target rises, deeper than `depth` spacings in the target or a
+ * panel's sine beyond `bent`; false if all hold. */
+static bool gives_way(const morph_blanket_state *b, const morph_violation *v, double depth, double bent,
+                      morph_blanket_report *report) {
     const double spacing = b->structure->spacing;
     report->held_element = -1;
     if (v->length > MORPH_BLANKET_LENGTH_HELD * spacing) {
@@ -238,9 +244,9 @@ static bool gives_way(const morph_blanket_state *b, const morph_violation *v, mo
     } else if (v->angle > ANGLE_GIVES) {
         report->held_by = MORPH_BLANKET_ANGLE;
         report->held_element = v->tuple;
-    } else if (v->clearance > MORPH_BLANKET_CLEARANCE_HELD * spacing)
+    } else if (v->clearance > depth * spacing)
         resisting(b, report);
-    else if (v->panel > MORPH_BLANKET_PANEL_HELD)
+    else if (v->panel > bent)
         report->held_by = MORPH_BLANKET_PANEL;
     else
         return false;
@@ -256,7 +262,30 @@ static bool rising(const morph_blanket_state *b) {
 static bool refused(const morph_blanket_state *b, const morph_violation *polished,
                     morph_blanket_report *report) {
     const morph_violation raw = morph_blanket_violation(b, b->x);
-    return gives_way(b, polished, report) || (!b->held_up && gives_way(b, &raw, report));
+    return gives_way(b, polished, MORPH_BLANKET_CLEARANCE_HELD, MORPH_BLANKET_PANEL_HELD, report) ||
+           (!b->held_up && gives_way(b, &raw, RAW_DEPTH, RAW_DEPTH, report));
+}
+
+/* The frame done again from its start, and its record. */
+static morph_status repeat_frame(morph_blanket_state *b, const frame_start *at, int *steps,
+                                 morph_trajectory *t, morph_blanket_report *report, morph_violation *v) {
+    const double time = --t->frames * b->def.frame;
+    rewind_frame(b, at);
+    const morph_status status = next_frame(b, at, steps, report);
+    if (status == MORPH_OK) *v = record(b, time, t);
+    return status;
+}
+
+/* A part of the target that came between the places: now that exact distances have put places there, the
+ * frame is run again. */
+static morph_status review(morph_blanket_state *b, const frame_start *at, int *steps, morph_trajectory *t,
+                           morph_blanket_report *report, morph_violation *v) {
+    morph_status status = MORPH_OK;
+    for (int tries = 0; tries < MOST_REVIEWS && status == MORPH_OK && !b->soft && !b->def.drive &&
+                        v->clearance > MORPH_BLANKET_CLEARANCE_HELD * b->structure->spacing;
+         tries++)
+        status = repeat_frame(b, at, steps, t, report, v);
+    return status;
 }
 
 /* A frame and its record. Where the rising target would break a limit, the frame is done again with the
@@ -270,10 +299,10 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
     morph_status status = next_frame(b, &at, steps, report);
     if (status != MORPH_OK) return status;
     morph_violation v = record(b, time, t);
+    status = review(b, &at, steps, t, report, &v);
+    if (status != MORPH_OK) return status;
     morph_blanket_report cause;
     for (int tries = 0; tries < MOST_RETREATS && (rose || b->held_up) && refused(b, &v, &cause); tries++) {
-        t->frames--;
-        rewind_frame(b, &at);
         if (!b->held_up) {
             report->held_time = at.time;
             report->held_by = cause.held_by;
@@ -281,20 +310,8 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
         } else
             b->retreat += RETREAT * b->structure->spacing / b->def.frame;
         b->held_up = report->held_up = true;
-        status = next_frame(b, &at, steps, report);
+        status = repeat_frame(b, &at, steps, t, report, &v);
         if (status != MORPH_OK) return status;
-        v = record(b, time, t);
-    }
-    /* A part of the target that came between the places: now that exact distances have put places there, the
-     * frame is run again. */
-    for (int tries = 0; tries < MOST_REVIEWS && !b->soft && !b->def.drive &&
-                        v.clearance > MORPH_BLANKET_CLEARANCE_HELD * b->structure->spacing;
-         tries++) {
-        t->frames--;
-        rewind_frame(b, &at);
-        status = next_frame(b, &at, steps, report);
-        if (status != MORPH_OK) return status;
-        v = record(b, time, t);
     }
     report->short_of = -b->lift;
     note_worst(report, &v);

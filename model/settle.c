@@ -30,6 +30,12 @@ enum { MOST_ROUNDS = 4, MOST_NEWTONS = 10, MOST_HALVINGS = 12, MOST_SADDLES = 4,
 #define MOST_PENALTY 4e3
 #define LAST_PENALTY 1e6
 #define CLOSE 1e-3
+/* Friction is held between this part and all of what Coulomb's law allows, from the first to the last: where
+ * shorter steps find no rest, the contacts' forces and the friction they allow drive each other to and fro,
+ * and the wider the range the less friction follows. */
+#define FIRST_CONE 0.9
+#define LAST_CONE 0.5
+#define CALMER 0.8
 /* Forces that grow by less than this in a step do not keep the next step from growing: a part that falls
  * freely, or swings down, has the same force left over all the way, give or take a little. */
 #define STEADY 1.02
@@ -211,6 +217,7 @@ static void watch_progress(morph_settle *s, double residual) {
         s->best_age = 0;
         s->least_drag = fmin(MOST_LEAST_DRAG, 4.0 * s->least_drag);
         s->drag = fmax(s->drag, s->least_drag);
+        if (s->least_drag >= MOST_LEAST_DRAG) s->least_cone = fmax(LAST_CONE, CALMER * s->least_cone);
     }
 }
 
@@ -241,6 +248,7 @@ static void start_run(morph_settle *s) {
     s->least_drag = LEAST_DRAG;
     s->best = INFINITY;
     s->best_age = 0;
+    s->least_cone = FIRST_CONE;
     s->falling = 0;
     s->nearest = INFINITY;
 }

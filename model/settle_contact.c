@@ -25,18 +25,17 @@ enum { LATTICE = 4 };
 #define FLAT 1e-3
 /* Seekers without a force and further off than this are free again. */
 #define FORGET 0.05
-#define LEAST_CONE 0.9
 /* A sliding contact drags the place where its friction spring hangs along, this far behind (spacings). */
 #define ROPE 0.02
 /* What stands no further off keeps that place: contacts that share a load pass it to and fro. */
 #define LOOSE 1e-3
 
-/* Friction's most force follows the contact's, but not its last changes: while it lies between LEAST_CONE and
+/* Friction's most force follows the contact's, but not its last changes: while it lies between least_cone and
  * all of what Coulomb's law allows it stays. Where friction itself presses a contact on, following at once is
  * a feedback that need not settle; any force within the cone holds at rest. */
 static void set_cone(const morph_settle *s, morph_settle_place *p) {
     const double most = s->friction * p->push * p->slope;
-    if (!(p->cone <= most && p->cone >= LEAST_CONE * most)) p->cone = 0.5 * (1.0 + LEAST_CONE) * most;
+    if (!(p->cone <= most && p->cone >= s->least_cone * most)) p->cone = 0.5 * (1.0 + s->least_cone) * most;
 }
 
 static void add_place(morph_settle *s, const int *joint, int corners, const double *weight, double radius) {

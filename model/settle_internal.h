@@ -86,6 +86,7 @@ struct morph_settle {
     double least_drag;   /* that steps may come down to now */
     double best;         /* least force left over lately */
     int best_age;        /* steps since */
+    double least_cone;   /* part of Coulomb's most friction that a contact may be held to now */
     double nearest;      /* joint to the target, m, while nothing is held */
     int falling;         /* steps away from it without contact */
     double *before;      /* 3*joints */
