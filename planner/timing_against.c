@@ -74,21 +74,26 @@ static morph_status fill(const morph_curve *curve, const morph_timing *timing, h
     return MORPH_OK;
 }
 
-/* faster: how many times faster the profile would have to run. */
+/* How far the profile run `faster` times as fast passes the limit, in limits. */
+static double beyond(const held_up *h, int kind, double faster) {
+    return h->ratio * pow(faster, kind + 1) - 1.0;
+}
+
 static void describe(const morph_structure *s, int kind, int link, const held_up *h, double faster,
                      double asked, char *text, size_t size) {
     char element[96] = "";
     const double limit = limit_of(s, kind, link);
     morph_link_name(s, link, element, sizeof element);
     snprintf(text, size, "%s of %s at %.3f s (%.3g %s beyond %.3g %s in %.6g s)", kind_name[kind], element,
-             h->time, limit * (h->ratio * pow(faster, kind + 1) - 1.0), kind_unit[kind], limit,
-             kind_unit[kind], asked);
+             h->time, limit * beyond(h, kind, faster), kind_unit[kind], limit, kind_unit[kind], asked);
 }
 
 static void name_them(const morph_structure *s, const held_up *list, double faster, double asked, char *text,
                       size_t size) {
     double sum[KINDS] = {0.0}, all = 0.0;
     for (int n = 0; n < KINDS * s->links; n++) {
+        /* Where nothing moves but rounding, nothing is passed either. */
+        if (beyond(&list[n], n / s->links, faster) <= 0.0) continue;
         sum[n / s->links] += list[n].seconds;
         all += list[n].seconds;
     }
