@@ -40,7 +40,7 @@ static void explain(motion m, const double limits[3], double share, char *text, 
     }
     morph_curve *curve = NULL;
     assert_int_equal(morph_curve_create(s, parameter, x, POSES, &curve), MORPH_OK);
-    const morph_timing_options o = {0.0, 0.001, NULL};
+    const morph_timing_options o = {0.0, 0.01, NULL};
     morph_timing timing;
     morph_timing_report report;
     assert_int_equal(morph_timing_solve(curve, &o, &timing, &report), MORPH_OK);
