@@ -1,5 +1,6 @@
 /** From the blanket's end to a schedule: refinement, path and timing of a plan. */
 #include "planner/plan_internal.h"
+#include "planner/timing_against.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -231,6 +232,19 @@ static double sample_step(morph_planner *p) {
     return p->timing.duration / most;
 }
 
+/* The limits that a duration leaves too little time for. */
+static morph_status say_too_short(morph_planner *p, double needed) {
+    morph_summary *s = &p->plan->summary;
+    char against[400];
+    const morph_status status =
+        morph_timing_against(p->curve, &p->timing, p->scene->duration, against, sizeof against);
+    if (status != MORPH_OK) return status;
+    snprintf(s->reason, sizeof s->reason,
+             "schedule.duration: %.6g s is too short: this path needs %.6g s%s%s", p->scene->duration, needed,
+             against[0] ? ": against it stood: " : "", against);
+    return MORPH_OK;
+}
+
 morph_status morph_stage_timing(morph_planner *p) {
     const double since = morph_seconds();
     morph_planner_limit(p, MORPH_STAGE_TIMING);
@@ -243,9 +257,7 @@ morph_status morph_stage_timing(morph_planner *p) {
     s->linear_seconds += r.linear_seconds;
     s->duration = p->timing.duration;
     if (status == MORPH_OK && p->scene->duration > 0.0 && r.needed > p->scene->duration)
-        snprintf(s->reason, sizeof s->reason,
-                 "schedule.duration: %.6g s is too short: this path needs %.6g s", p->scene->duration,
-                 r.needed);
+        status = say_too_short(p, r.needed);
     if (status == MORPH_OK)
         status = morph_record_schedule(&p->plan->record, p->curve, &p->timing, sample_step(p));
     morph_planner_time(p, MORPH_STAGE_TIMING, since);
