@@ -158,6 +158,7 @@ static bool set_plane(const morph_blanket_state *b, morph_contact *c, const doub
     const double fall = b->pull > 0.0 ? sqrt(b->pull * b->structure->spacing) * b->step : INFINITY;
     const double most = b->moved > 5.0 * fall ? INFINITY : fall;
     if (depth > most) c->level -= depth - most;
+    c->spare = morph_dot(c->normal, q) - c->level;
     c->radius = radius;
     return true;
 }
@@ -333,7 +334,9 @@ void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
     if (b->soft) morph_blanket_soft_renew(b);
     for (int k = 0; k < b->contacts; k++) {
         morph_contact *c = &b->contact[k];
-        if (c->radius >= 0.0 && c->push > 0.0) set_plane(b, c, x, c->radius);
+        if (!(c->radius >= 0.0 && c->push > 0.0)) continue;
+        set_plane(b, c, x, c->radius);
+        c->spare = 0.0; /* x is not where the limits were listed */
     }
 }
 

@@ -35,6 +35,7 @@ typedef struct morph_contact {
     double share[3];  /* weight times the joint's own */
     double inverse;   /* 1 / sum weight share */
     double radius;    /* of the place; -1: the plane stays as it is in this step */
+    double spare;     /* to the half space where the limits were listed */
     int source;       /* number of the touch; touches + joint for the base plane */
     double push;      /* accumulated along the normal, >= 0 (m per unit weight) */
     double drag[3];   /* accumulated friction, at most friction * push */
@@ -167,6 +168,9 @@ typedef struct morph_blanket_state {
     int *first_touch;            /* spans but posts, and one more */
     int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
     int near_links, near_angles;
+    /* Of the angles listed: how far their four ends may move in all before a sweep must look at them, m. By
+     * joint: where it was when they were listed, and how far it is from there as a complete sweep starts. */
+    double *calm, *listed_x, *strayed;
     /* Of them and of the contacts those that the last complete sweep found at work or nearly so. */
     int *hot_link, *hot_angle, *hot_contact;
     int hot_links, hot_angles, hot_contacts;

@@ -72,6 +72,10 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
     b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
     b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
+    b->calm = morph_alloc((size_t)b->angles, sizeof *b->calm);
+    b->listed_x = morph_alloc(3 * (size_t)b->joints, sizeof *b->listed_x);
+    b->strayed = morph_alloc((size_t)b->joints, sizeof *b->strayed);
+    if (!b->calm || !b->listed_x || !b->strayed) return MORPH_ERR_NOMEM;
     if (!b->angle_far || !b->turn || !b->come || !b->link_wake || !b->near_link || !b->near_angle ||
         !b->angle_wake || !b->hot_link || !b->hot_angle)
         return MORPH_ERR_NOMEM;
@@ -246,15 +250,18 @@ static bool link_near(morph_blanket_state *b, int l, const double *x, double nea
 /* With the ends of an arm of length a moving by m in all, it turns by at most m / (a - m); the cosine changes
  * by at most the sum of both turns: with m for both it keeps a distance g where m <= g a / (1 + g). */
 static bool angle_near(const morph_blanket_state *b, const morph_turn *a, const double *x, double near,
-                       double path, bool note) {
+                       double path, bool note, double *calm) {
     double u[3], v[3];
     arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
+    *calm = 0.0;
     if (!(scale > 0.0)) return true;
     const double c = morph_dot(u, v) / scale, high = a->ceiling - c, low = c - a->floor;
     const double gap = high < low ? high : low;
     if (!(gap > 0.0)) return true;
-    const double spare = gap * sqrt(uu < vv ? uu : vv) / (1.0 + gap) - near;
+    const double arm = sqrt(uu < vv ? uu : vv), cool = gap - HOT_COSINE;
+    const double spare = gap * arm / (1.0 + gap) - near;
+    if (cool > 0.0) *calm = cool * arm / (1.0 + cool);
     if (note && spare > 0.0) b->angle_wake[a - b->turn] = path + spare;
     return !(spare > 0.0);
 }
@@ -275,6 +282,7 @@ static void list_links(morph_blanket_state *b, const double *x, double add, bool
 
 void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all) {
     const double add = b->added, *move = b->move;
+    memcpy(b->listed_x, x, 3 * (size_t)b->joints * sizeof *x);
     for (int j = 0; j < b->joints; j++)
         b->come[j] = b->path[j] + move[j];
     list_links(b, x, add, all);
@@ -284,7 +292,7 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all
         const double come = b->come[a->u[0]] + b->come[a->u[1]] + b->come[a->v[0]] + b->come[a->v[1]];
         if (!all && come + 4.0 * add < b->angle_wake[t]) continue;
         const double own = all ? 0.0 : move[a->u[0]] + move[a->u[1]] + move[a->v[0]] + move[a->v[1]];
-        if (angle_near(b, a, x, 4.0 * add + own, come - own, !all))
+        if (angle_near(b, a, x, 4.0 * add + own, come - own, !all, &b->calm[b->near_angles]))
             b->near_angle[b->near_angles++] = t;
         else
             a->push[0] = a->push[1] = 0.0;
@@ -446,12 +454,26 @@ void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm)
     project_posts(b, x);
 }
 
-/* All listed rows; lists those that are hot. */
+/* How far every joint is from where the limits were listed. */
+static void note_strayed(morph_blanket_state *b, const double *x) {
+    for (int j = 0; j < b->joints; j++)
+        b->strayed[j] = morph_dist(&x[3 * j], &b->listed_x[3 * j]);
+}
+
+/* Nothing pushes at the angle and its ends have not moved enough to bring it near a limit. */
+static bool is_calm(const morph_blanket_state *b, const morph_turn *a, double calm) {
+    const double *moved = b->strayed;
+    return moved[a->u[0]] + moved[a->u[1]] + moved[a->v[0]] + moved[a->v[1]] < calm && !at_work(a);
+}
+
+/* All listed rows that are not calm; lists those that are hot. */
 static void sweep_complete(morph_blanket_state *b, double *x, bool backward) {
     double motion;
     b->hot_angles = b->hot_links = b->hot_contacts = 0;
+    note_strayed(b, x);
     for (int t = 0; t < b->near_angles; t++) {
-        const int angle = b->near_angle[backward ? b->near_angles - 1 - t : t];
+        const int at = backward ? b->near_angles - 1 - t : t, angle = b->near_angle[at];
+        if (is_calm(b, &b->turn[angle], b->calm[at])) continue;
         if (project_angle(&b->turn[angle], &b->angle[angle], x, &motion))
             b->hot_angle[b->hot_angles++] = angle;
         note(b, motion);
@@ -495,11 +517,20 @@ static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
     b->hot_links = close_up(b->hot_link, b->hot_links, kept, backward);
 }
 
+/* Nothing pushes at the contact and its corners have not moved enough to bring it near. */
+static bool is_clear(const morph_blanket_state *b, const morph_contact *c, double hot) {
+    double moved = 0.0;
+    for (int k = 0; k < c->corners; k++)
+        if (b->strayed[c->joint[k]] > moved) moved = b->strayed[c->joint[k]];
+    return moved < c->spare - hot && c->push == 0.0;
+}
+
 static void sweep_contacts(morph_blanket_state *b, double *x, bool complete, bool backward, double friction) {
     const double hot = HOT_LENGTH * b->structure->spacing, still = STILL * b->structure->spacing;
     for (int n = 0; n < b->contacts && complete; n++) {
         double gap;
         const int contact = backward ? b->contacts - 1 - n : n;
+        if (is_clear(b, &b->contact[contact], hot)) continue;
         note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, &gap));
         if (gap < hot || b->contact[contact].push > 0.0) b->hot_contact[b->hot_contacts++] = contact;
     }
