@@ -13,7 +13,7 @@
 /* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
  * joint moves 0.1 spacings per step, what a step is planned for; with 0.05 a drape no longer comes to rest.
  */
-#define LONGEST_STEP 0.034
+#define LONGEST_STEP 0.04
 /* A frame whose energy rose without cause is redone with half the step, down to this part of the step that
  * should be stable: what still rises then is no matter of the step. */
 #define LEAST_STEP (1.0 / 16.0)
@@ -23,7 +23,7 @@
 #define MOST_MOVE 0.25
 /* What would move further than FAST spacings in the step that forces ask for is planned for FAST_MOVE: half a
  * link's usual radius, with which even an edge without thickness does not cut the skin. */
-#define FAST 0.15
+#define FAST 0.175
 #define FAST_MOVE 0.02
 /* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
  * angle): half a degree, what the falling blanket's own frames keep. */

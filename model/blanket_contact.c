@@ -240,8 +240,6 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     const double listed = b->added, lift = fabs(b->lift_to - b->lift);
     double q[3], from[3], *wake = &b->touch_wake[t - b->touch];
     morph_blanket_place(x, t->joint, t->corners, t->weight, q);
-    morph_blanket_place(b->before, t->joint, t->corners, t->weight, from);
-    const double own = listed + morph_dist(q, from) + lift;
     if (t->stride == 0.0) {
         double by;
         const double spare = spare_since(b, t, q, &by);
@@ -249,9 +247,11 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
             *wake = been + spare - b->move[t->span] - lift;
             return;
         }
-        /* Not while a new distance would let it sleep. */
-        if (spare > own / MOST_SLOPE && spare + by < reach) return;
+        /* Not while a new distance would let it sleep. No place moves further than its span. */
+        if (spare > (listed + b->move[t->span] + lift) / MOST_SLOPE && spare + by < reach) return;
     }
+    morph_blanket_place(b->before, t->joint, t->corners, t->weight, from);
+    const double own = listed + morph_dist(q, from) + lift;
     const bool moved = has_moved(b, t, q);
     double gap = distance_of(b, t, q, NULL) - t->radius;
     if (t->stride == 0.0 && gap / MOST_SLOPE > reach) {

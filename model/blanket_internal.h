@@ -264,17 +264,20 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, int sweep, double fr
  * few are enough where few lengths are beyond. Forgets the links' corrections. False where some still are,
  * and at once where panels or prescribed lengths hang all together. */
 bool morph_blanket_sweep_lengths(morph_blanket_state *b, double *x);
-/* The panel's volume over the size of its gradient, a length, and the gradient of norm 1 by bottom and top of
- * either post. False where it has no direction. */
-bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
-                             double grad[4][3]);
-double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
-/* The same with its gradient by the angle's joints, those held 0; false where it has none. */
+/* The cosine with its gradient by the angle's joints, those held 0; false where it has none. */
 bool morph_blanket_cosine_gradient(const morph_blanket_state *b, int angle, const double *x, double *c,
                                    double grad[4][3]);
 double morph_blanket_cosine(const morph_blanket_state *b, int angle, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
+/* blanket_panel.c */
+/* The panel's volume over the size of its gradient, a length, and the gradient of norm 1 by bottom and top of
+ * either post. False where it has no direction. */
+bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
+                             double grad[4][3]);
+double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
+void morph_blanket_project_panel(const morph_blanket_state *b, int panel, double *x); /* into its plane */
+
 /* blanket_polish.c: what the unpolished state breaks. */
 morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x);
 /* blanket_polish.c: sweeps until x holds the structure's own limits or stops improving; contact by the exact

@@ -15,6 +15,8 @@
 /* Rows whose correction moves no joint further than this, spacings, are left alone until the next complete
  * sweep: a hundredth of the limits' margins. */
 #define STILL 1e-5
+/* Relative error of a post's squared length that is taken for rounding; a projection leaves some 4e-16. */
+#define POST_RIGHT 2e-15
 /* Every so many sweeps one is complete. */
 #define COMPLETE 6
 
@@ -112,12 +114,12 @@ static void note(morph_blanket_state *b, double motion) {
 }
 
 /* Moves two joints apart by q d, each by its weight's share; two held ones stay. */
-static void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj, const double d[3],
-                 double q) {
+static inline void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj,
+                        const double d[3], double q) {
     const double wi = b->weight[ends[0]], wj = b->weight[ends[1]];
     double qi = 0.5 * q, qj = qi;
-    if (wi + wj == 0.0) return;
-    if (wi != wj) {
+    if (wi != 1.0 || wj != 1.0) {
+        if (wi + wj == 0.0) return;
         qi = q * (wi / (wi + wj));
         qj = q * (wj / (wi + wj));
     }
@@ -145,16 +147,17 @@ void morph_blanket_project_posts_along(morph_blanket_state *b) {
     }
 }
 
-/* Posts share no joint, so this one is exact. */
+/* Posts share no joint, so this one is exact. What no sweep has moved since is still right, to rounding. */
 static void project_posts(morph_blanket_state *b, double *x) {
     const morph_structure *s = b->structure;
     for (int p = 0; p < b->posts; p++) {
         double *xb = &x[3 * s->post[p][0]], *xt = &x[3 * s->post[p][1]], d[3];
         morph_sub(xt, xb, d);
-        const double length = morph_norm(d);
-        if (!(length > 0.0)) continue;
-        note(b, s->post_length[p] - length);
-        part(b, s->post[p], xb, xt, d, s->post_length[p] / length - 1.0);
+        const double square = morph_dot(d, d), wanted = s->post_length[p];
+        if (fabs(square - wanted * wanted) <= POST_RIGHT * square || !(square > 0.0)) continue;
+        const double length = sqrt(square);
+        note(b, wanted - length);
+        part(b, s->post[p], xb, xt, d, wanted / length - 1.0);
     }
 }
 
@@ -204,6 +207,14 @@ static inline void arms(const morph_turn *a, const double *x, double u[3], doubl
     morph_sub(&x[3 * a->v[1]], &x[3 * a->v[0]], v);
 }
 
+static inline void add_gradient(const morph_angle *a, int j, const double gu[3], const double gv[3],
+                                double (*grad)[3], double *square) {
+    const double w = a->weight[j], su = a->su[j], sv = a->sv[j];
+    for (int k = 0; k < 3; k++)
+        grad[j][k] = w * (su * gu[k] + sv * gv[k]);
+    *square += morph_dot(grad[j], grad[j]);
+}
+
 /* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
  * su dc/du + sv dc/dv, times its weight. Returns the sum of the gradients' squares; 0 where the arms are
  * parallel, which the limits keep far from, or all joints are held. arm: the shorter arm's length. grad may
@@ -222,11 +233,10 @@ static double cosine(const morph_turn *t, const morph_angle *a, const double *x,
         gu[k] = v[k] * one - cu * u[k];
         gv[k] = u[k] * one - cv * v[k];
     }
-    for (int j = 0; j < a->joints; j++) {
-        for (int k = 0; k < 3; k++)
-            grad[j][k] = a->weight[j] * (a->su[j] * gu[k] + a->sv[j] * gv[k]);
-        square += morph_dot(grad[j], grad[j]);
-    }
+    add_gradient(a, 0, gu, gv, grad, &square);
+    add_gradient(a, 1, gu, gv, grad, &square);
+    add_gradient(a, 2, gu, gv, grad, &square);
+    if (a->joints > 3) add_gradient(a, 3, gu, gv, grad, &square);
     return square * scale > 1e-12 ? square : 0.0;
 }
 
@@ -309,10 +319,18 @@ static double clip(double value, double most) {
     return value > most ? most : value < -most ? -most : value;
 }
 
-static void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
-    for (int j = 0; j < a->joints; j++)
-        for (int k = 0; k < 3; k++)
-            x[3 * a->joint[j] + k] += change * grad[j][k];
+static inline void move(double *x, const double d[3], double by) {
+    x[0] += by * d[0];
+    x[1] += by * d[1];
+    x[2] += by * d[2];
+}
+
+/* An angle has at least three joints. */
+static inline void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
+    move(&x[3 * a->joint[0]], grad[0], change);
+    move(&x[3 * a->joint[1]], grad[1], change);
+    move(&x[3 * a->joint[2]], grad[2], change);
+    if (a->joints > 3) move(&x[3 * a->joint[3]], grad[3], change);
 }
 
 /* Whether floor < cos(u, v) < ceiling, without root or division; false where it cannot be told so. */
@@ -334,12 +352,18 @@ static double correct_angle(morph_turn *t, const morph_angle *a, double *x, doub
     return change * a->size;
 }
 
+/* Sum of the gradients times the joints. */
+static inline double along(const morph_angle *a, const double *x) {
+    double sum = morph_dot(a->grad[0], &x[3 * a->joint[0]]) + morph_dot(a->grad[1], &x[3 * a->joint[1]]) +
+                 morph_dot(a->grad[2], &x[3 * a->joint[2]]);
+    if (a->joints > 3) sum += morph_dot(a->grad[3], &x[3 * a->joint[3]]);
+    return sum;
+}
+
 /* Between complete sweeps the cosine is taken as linear: joints move by fractions of HOT_LENGTH (or all
  * sweeps are complete), over which its second derivatives, at most 4 / arm^2, change it by less than 1e-4. */
 static double linear_angle(morph_turn *t, const morph_angle *a, double *x) {
-    double c = a->level;
-    for (int j = 0; j < a->joints; j++)
-        c += morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    const double c = a->level + along(a, x);
     return at_work(t) || c < t->floor || c > t->ceiling ? correct_angle(t, a, x, c) : 0.0;
 }
 
@@ -361,9 +385,7 @@ static bool project_angle(morph_turn *t, morph_angle *a, double *x, double *moti
     a->inverse = 1.0 / square;
     a->most = 0.5 * arm / a->size;
     a->linear = true;
-    a->level = c;
-    for (int j = 0; j < a->joints; j++)
-        a->level -= morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    a->level = c - along(a, x);
     *motion = correct_angle(t, a, x, c);
     return true;
 }
@@ -376,69 +398,6 @@ static void start_angle(morph_turn *t, const morph_angle *a, double *x, double w
     t->push[0] = fmin(warm * t->push[0], limit);
     t->push[1] = fmin(warm * t->push[1], limit);
     if (square > 0.0) turn(a, x, (const double(*)[3])grad, t->push[0] - t->push[1]);
-}
-
-/* Volume of a panel's four corners, six times: det[p, r, d] with the posts p and r and d between their feet.
- * By a's bottom and top, then b's: grad = -(r x d) - p x r, r x d, -(d x p) + p x r, d x p. */
-static double panel_volume(const morph_structure *s, int panel, const double *x, const double *corner[4],
-                           double grad[4][3]) {
-    const int *a = s->post[s->panel[panel][0]], *b = s->post[s->panel[panel][1]];
-    const int joint[4] = {a[0], a[1], b[0], b[1]};
-    double p[3], r[3], d[3], pr[3], rd[3], dp[3];
-    for (int k = 0; k < 4; k++)
-        corner[k] = &x[3 * joint[k]];
-    morph_sub(corner[1], corner[0], p);
-    morph_sub(corner[3], corner[2], r);
-    morph_sub(corner[2], corner[0], d);
-    morph_cross(p, r, pr);
-    morph_cross(r, d, rd);
-    morph_cross(d, p, dp);
-    for (int k = 0; k < 3; k++) {
-        grad[0][k] = -rd[k] - pr[k];
-        grad[1][k] = rd[k];
-        grad[2][k] = -dp[k] + pr[k];
-        grad[3][k] = dp[k];
-    }
-    return morph_dot(pr, d);
-}
-
-/* Sine of the angle by which a panel is out of plane. */
-double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x) {
-    const double *corner[4];
-    double grad[4][3];
-    const double volume = panel_volume(s, panel, x, corner, grad);
-    const double scale = morph_dist(corner[0], corner[1]) * morph_dist(corner[2], corner[3]) *
-                         morph_dist(corner[0], corner[2]);
-    return scale > 0.0 ? volume / scale : 0.0;
-}
-
-bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
-                             double grad[4][3]) {
-    const double *corner[4];
-    const double volume = panel_volume(s, panel, x, corner, grad);
-    double square = 0.0;
-    for (int k = 0; k < 4; k++)
-        square += morph_dot(grad[k], grad[k]);
-    const double size = sqrt(square);
-    *residual = size > 0.0 ? volume / size : 0.0;
-    for (int k = 0; k < 12 && size > 0.0; k++)
-        grad[k / 3][k % 3] /= size;
-    return size > 0.0;
-}
-
-static void project_panel(const morph_blanket_state *b, int panel, double *x) {
-    const morph_structure *s = b->structure;
-    const double *corner[4];
-    double grad[4][3], square = 0.0;
-    const double volume = panel_volume(s, panel, x, corner, grad);
-    for (int k = 0; k < 4; k++)
-        square += b->weight[(corner[k] - x) / 3] * morph_dot(grad[k], grad[k]);
-    if (!(square > 0.0)) return;
-    for (int k = 0; k < 4; k++) {
-        const ptrdiff_t joint = (corner[k] - x) / 3;
-        for (int m = 0; m < 3; m++)
-            x[3 * joint + m] -= volume / square * b->weight[joint] * grad[k][m];
-    }
 }
 
 /* What carries weight moves joints by a few times its acceleration times step^2 every step. An impact's
@@ -558,7 +517,7 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, int sweep, double fr
         sweep_hot(b, x, backward != b->hot_backward);
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
-        project_panel(b, backward ? panels - 1 - p : p, x);
+        morph_blanket_project_panel(b, backward ? panels - 1 - p : p, x);
     note(b, morph_blanket_project_self(b, x, backward));
     sweep_contacts(b, x, complete, complete ? backward : backward != b->hot_backward, friction);
     if (b->soft) morph_blanket_soft_sweep(b, x, backward, friction);

@@ -25,7 +25,7 @@ enum { MOST_NEAR = 256 };
  * all of the target, or the motion is so fast (blanket.c, FAST) that impacts push what is in contact through.
  */
 #define SHORT_MOVE 0.1
-#define FAST 0.15 /* spacings in the step that forces ask for */
+#define FAST 0.175 /* spacings in the step that forces ask for */
 /* Elements are watched while they are nearer than this, spacings: what is further cannot reach the target in
  * a step (blanket.c, MOST_MOVE). */
 #define WATCH 0.5
