@@ -57,6 +57,13 @@ static morph_status trajectory_create(morph_trajectory *t, int capacity, int joi
     return MORPH_ERR_NOMEM;
 }
 
+static double farthest(const morph_blanket_state *b, const double *from) {
+    double most = 0.0;
+    for (int j = 0; j < b->joints; j++)
+        most = fmax(most, morph_dist(&b->x[3 * j], &from[3 * j]));
+    return most;
+}
+
 /* A frame is the state with its limits polished; the motion itself goes on unpolished, unless the frame had
  * to be brought out of the target. */
 static morph_violation record(morph_blanket_state *b, double time, morph_trajectory *t) {
@@ -64,7 +71,10 @@ static morph_violation record(morph_blanket_state *b, double time, morph_traject
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));
     const morph_violation worst = morph_blanket_polish(b, x);
     /* What was in the target by exact distances would be so again: the motion goes on from outside. */
-    if (b->entered) memcpy(b->x, x, 3 * (size_t)b->joints * sizeof(double));
+    if (b->entered) {
+        b->lift_path += farthest(b, x); /* nothing sleeps past this jump */
+        memcpy(b->x, x, 3 * (size_t)b->joints * sizeof(double));
+    }
     t->lift[t->frames] = b->lift;
     t->time[t->frames++] = time;
     return worst;
@@ -195,13 +205,6 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
     report->steps += now;
     report->step = b->step;
     return MORPH_OK;
-}
-
-static double farthest(const morph_blanket_state *b, const double *from) {
-    double most = 0.0;
-    for (int j = 0; j < b->joints; j++)
-        most = fmax(most, morph_dist(&b->x[3 * j], &from[3 * j]));
-    return most;
 }
 
 /* Mean over the frame of what moved fastest. */

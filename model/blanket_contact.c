@@ -305,6 +305,8 @@ void morph_blanket_forget(morph_blanket_state *b) {
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
     b->holds = 0;
+    for (int n = 0; n < b->links + b->structure->skin_triangles; n++)
+        b->memo[n].been = -INFINITY;
     morph_blanket_self_forget(b->self);
     if (b->soft) morph_blanket_soft_forget(b);
 }

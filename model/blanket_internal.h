@@ -90,6 +90,7 @@ typedef struct morph_damper {
 /* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
 typedef struct morph_memo {
     double corner[3][3], gap;
+    double been;                /* path of its span and the target by then; -INFINITY: unknown */
     double weight[3];           /* of the deepest place */
     double normal[3], point[3]; /* there: gradient of the distance, closest point of the target */
     bool bounded;      /* gap is only a lower bound, the others are of some other place of the element */
@@ -345,6 +346,9 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
 /* At least how far an element is from the target beyond its radius, by its last exact distance: corners as
  * the target sees them. Negative infinity where nothing is known. */
 double morph_blanket_gap_bound(const morph_blanket_state *b, int element, const double v[3][3]);
+/* Whether an element's axis or middle is further than `reach` from the target at `before`, by its last exact
+ * distance and how far it has come since: cheaper than the bound above, and seldom as good. */
+bool morph_blanket_is_far(const morph_blanket_state *b, int element, double reach);
 /* Planes anew between a convex target and what those known no longer keep from it at x: for the guard. */
 void morph_blanket_renew_planes(morph_blanket_state *b);
 /* Puts the seeking places where exact distances have found elements deepest: a thin part of the target
