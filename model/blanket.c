@@ -10,8 +10,8 @@
  */
 #define REST_SPEED 5e-3
 #define REST_WINDOW 4.0
-/* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
- * joint moves 0.1 spacings per step, what a step is planned for; with 0.05 a drape no longer comes to rest.
+/* Longest step in sqrt(spacing / gravity): at speeds of 2.5 sqrt(gravity spacing), a fall of 3 spacings, a
+ * joint moves 0.1 spacings per step, what a step is planned for; with 0.05 sheets come through thin wires.
  */
 #define LONGEST_STEP 0.04
 /* A frame whose energy rose without cause is redone with half the step, down to this part of the step that
