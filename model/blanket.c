@@ -10,10 +10,10 @@
  */
 #define REST_SPEED 5e-3
 #define REST_WINDOW 4.0
-/* Longest step in sqrt(spacing / gravity): at speeds of 3 sqrt(gravity spacing), a fall of 4.5 spacings, a
- * joint moves 0.1 spacings per step, what a step is planned for; with 0.05 a drape no longer comes to rest.
+/* Longest step in sqrt(spacing / gravity): at speeds of 2.5 sqrt(gravity spacing), a fall of 3 spacings, a
+ * joint moves 0.1 spacings per step, what a step is planned for; with 0.05 sheets come through thin wires.
  */
-#define LONGEST_STEP 0.034
+#define LONGEST_STEP 0.04
 /* A frame whose energy rose without cause is redone with half the step, down to this part of the step that
  * should be stable: what still rises then is no matter of the step. */
 #define LEAST_STEP (1.0 / 16.0)
@@ -23,7 +23,7 @@
 #define MOST_MOVE 0.25
 /* What would move further than FAST spacings in the step that forces ask for is planned for FAST_MOVE: half a
  * link's usual radius, with which even an edge without thickness does not cut the skin. */
-#define FAST 0.15
+#define FAST 0.175
 #define FAST_MOVE 0.02
 /* A rising target is held up where a frame breaks an angle limit by more, radians (as cosine, near a right
  * angle): half a degree, what the falling blanket's own frames keep. */
@@ -61,6 +61,13 @@ static morph_status trajectory_create(morph_trajectory *t, int capacity, int joi
     return MORPH_ERR_NOMEM;
 }
 
+static double farthest(const morph_blanket_state *b, const double *from) {
+    double most = 0.0;
+    for (int j = 0; j < b->joints; j++)
+        most = fmax(most, morph_dist(&b->x[3 * j], &from[3 * j]));
+    return most;
+}
+
 /* A frame is the state with its limits polished; the motion itself goes on unpolished, unless the frame had
  * to be brought out of the target. */
 static morph_violation record(morph_blanket_state *b, double time, morph_trajectory *t) {
@@ -68,7 +75,10 @@ static morph_violation record(morph_blanket_state *b, double time, morph_traject
     memcpy(x, b->x, 3 * (size_t)b->joints * sizeof(double));
     const morph_violation worst = morph_blanket_polish(b, x);
     /* What was in the target by exact distances would be so again: the motion goes on from outside. */
-    if (b->entered) memcpy(b->x, x, 3 * (size_t)b->joints * sizeof(double));
+    if (b->entered) {
+        b->lift_path += farthest(b, x); /* nothing sleeps past this jump */
+        memcpy(b->x, x, 3 * (size_t)b->joints * sizeof(double));
+    }
     t->lift[t->frames] = b->lift;
     t->time[t->frames++] = time;
     return worst;
@@ -199,13 +209,6 @@ static morph_status next_frame(morph_blanket_state *b, const frame_start *at, in
     report->steps += now;
     report->step = b->step;
     return MORPH_OK;
-}
-
-static double farthest(const morph_blanket_state *b, const double *from) {
-    double most = 0.0;
-    for (int j = 0; j < b->joints; j++)
-        most = fmax(most, morph_dist(&b->x[3 * j], &from[3 * j]));
-    return most;
 }
 
 /* Mean over the frame of what moved fastest. */

@@ -158,6 +158,7 @@ static bool set_plane(const morph_blanket_state *b, morph_contact *c, const doub
     const double fall = b->pull > 0.0 ? sqrt(b->pull * b->structure->spacing) * b->step : INFINITY;
     const double most = b->moved > 5.0 * fall ? INFINITY : fall;
     if (depth > most) c->level -= depth - most;
+    c->spare = morph_dot(c->normal, q) - c->level;
     c->radius = radius;
     return true;
 }
@@ -239,8 +240,6 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
     const double listed = b->added, lift = fabs(b->lift_to - b->lift);
     double q[3], from[3], *wake = &b->touch_wake[t - b->touch];
     morph_blanket_place(x, t->joint, t->corners, t->weight, q);
-    morph_blanket_place(b->before, t->joint, t->corners, t->weight, from);
-    const double own = listed + morph_dist(q, from) + lift;
     if (t->stride == 0.0) {
         double by;
         const double spare = spare_since(b, t, q, &by);
@@ -248,9 +247,11 @@ static void find_target(morph_blanket_state *b, morph_touch *t, const double *x,
             *wake = been + spare - b->move[t->span] - lift;
             return;
         }
-        /* Not while a new distance would let it sleep. */
-        if (spare > own / MOST_SLOPE && spare + by < reach) return;
+        /* Not while a new distance would let it sleep. No place moves further than its span. */
+        if (spare > (listed + b->move[t->span] + lift) / MOST_SLOPE && spare + by < reach) return;
     }
+    morph_blanket_place(b->before, t->joint, t->corners, t->weight, from);
+    const double own = listed + morph_dist(q, from) + lift;
     const bool moved = has_moved(b, t, q);
     double gap = distance_of(b, t, q, NULL) - t->radius;
     if (t->stride == 0.0 && gap / MOST_SLOPE > reach) {
@@ -304,6 +305,8 @@ void morph_blanket_forget(morph_blanket_state *b) {
     memset(b->push, 0, (size_t)b->links * sizeof *b->push);
     memset(b->hold, 0, (size_t)(b->touches + b->joints) * sizeof *b->hold);
     b->holds = 0;
+    for (int n = 0; n < b->links + b->structure->skin_triangles; n++)
+        b->memo[n].been = -INFINITY;
     morph_blanket_self_forget(b->self);
     if (b->soft) morph_blanket_soft_forget(b);
 }
@@ -333,7 +336,9 @@ void morph_blanket_renew_contacts(morph_blanket_state *b, const double *x) {
     if (b->soft) morph_blanket_soft_renew(b);
     for (int k = 0; k < b->contacts; k++) {
         morph_contact *c = &b->contact[k];
-        if (c->radius >= 0.0 && c->push > 0.0) set_plane(b, c, x, c->radius);
+        if (!(c->radius >= 0.0 && c->push > 0.0)) continue;
+        set_plane(b, c, x, c->radius);
+        c->spare = 0.0; /* x is not where the limits were listed */
     }
 }
 

@@ -118,6 +118,23 @@ static element element_of(const morph_structure *s, int n) {
     return (element){s->link[n], 2, s->link_radius[n], s->link_kind[n] != MORPH_LINK_BOTTOM};
 }
 
+/* The element's path so far. Its corners v may be those of a frame that is polished: what they are off the
+ * motion by counts as a way. */
+static double been_at(const morph_blanket_state *b, const element *e, int n, const double v[3][3]) {
+    double now[3][3], off = 0.0;
+    place_element(b, b->x, e->joint, e->corners, now);
+    for (int k = 0; k < e->corners; k++)
+        off = fmax(off, morph_dist(v[k], now[k]));
+    return b->path[b->joints + n] + b->lift_path - off;
+}
+
+bool morph_blanket_is_far(const morph_blanket_state *b, int n, double reach) {
+    const morph_memo *memo = &b->memo[n];
+    const double radius = n < b->links ? b->structure->link_radius[n] : b->structure->def.radius;
+    const double come = b->path[b->joints + n] + b->lift_path - memo->been;
+    return memo->known && memo->gap + radius - come > reach;
+}
+
 /* Exact distance of an element from where its deepest place was last time. Beyond NEAR nobody asks how far.
  */
 static void measure(const morph_blanket_state *b, const element *e, const double v[3][3], morph_memo *memo) {
@@ -258,21 +275,29 @@ double morph_blanket_gap_bound(const morph_blanket_state *b, int n, const double
 
 void morph_blanket_renew_planes(morph_blanket_state *b) {
     const morph_structure *s = b->structure;
-    for (int n = 0; n < s->links + s->skin_triangles && b->hull; n++) {
+    if (!b->hull) return;
+    const double move = morph_blanket_moved(b, b->x) + fabs(b->lift_to - b->lift);
+    for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        if (morph_blanket_is_far(b, n, move)) continue;
         const element e = element_of(s, n);
         double v[3][3] = {{0.0}};
         if (!e.tested || !b->memo[n].known) continue;
         place_element(b, b->x, e.joint, e.corners, v);
         if (morph_blanket_gap_bound(b, n, (const double(*)[3])v) > -e.radius) continue;
-        clear_of_plane(b, &e, (const double(*)[3])v, LEAST_HEIGHT * s->spacing, &b->memo[n]);
+        if (clear_of_plane(b, &e, (const double(*)[3])v, LEAST_HEIGHT * s->spacing, &b->memo[n]))
+            b->memo[n].been = b->path[b->joints + n] + b->lift_path; /* this step's way counts once more */
     }
 }
 
 double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
     const morph_structure *s = b->structure;
     const double allowed = 0.5 * MORPH_BLANKET_CLEARANCE_HELD * s->spacing;
-    double depth = morph_blanket_base_depth(b, x);
+    double depth = morph_blanket_base_depth(b, x), off = 0.0;
+    for (int j = 0; j < b->joints; j++)
+        off = fmax(off, morph_dist(&x[3 * j], &b->x[3 * j]));
     for (int n = 0; n < s->links + s->skin_triangles; n++) {
+        const double radius = n < s->links ? s->link_radius[n] : s->def.radius;
+        if (morph_blanket_is_far(b, n, radius + off)) continue;
         const element e = element_of(s, n);
         if (!e.tested) continue;
         morph_memo *memo = &b->memo[n];
@@ -282,6 +307,7 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x) {
         depth = fmax(depth, bound >= -allowed ? -bound : 0.0);
         if (bound >= -allowed) continue;
         if (!measure_convex(b, &e, (const double(*)[3])v, memo)) measure(b, &e, (const double(*)[3])v, memo);
+        memo->been = been_at(b, &e, n, (const double(*)[3])v);
         depth = fmax(depth, -memo->gap);
     }
     return depth;

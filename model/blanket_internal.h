@@ -35,6 +35,7 @@ typedef struct morph_contact {
     double share[3];  /* weight times the joint's own */
     double inverse;   /* 1 / sum weight share */
     double radius;    /* of the place; -1: the plane stays as it is in this step */
+    double spare;     /* to the half space where the limits were listed */
     int source;       /* number of the touch; touches + joint for the base plane */
     double push;      /* accumulated along the normal, >= 0 (m per unit weight) */
     double drag[3];   /* accumulated friction, at most friction * push */
@@ -89,6 +90,7 @@ typedef struct morph_damper {
 /* Where an element was when its exact distance was taken, and what that left over beyond its radius. */
 typedef struct morph_memo {
     double corner[3][3], gap;
+    double been;                /* path of its span and the target by then; -INFINITY: unknown */
     double weight[3];           /* of the deepest place */
     double normal[3], point[3]; /* there: gradient of the distance, closest point of the target */
     bool bounded;      /* gap is only a lower bound, the others are of some other place of the element */
@@ -167,6 +169,9 @@ typedef struct morph_blanket_state {
     int *first_touch;            /* spans but posts, and one more */
     int *near_link, *near_angle; /* those that can reach a limit in this step, ascending */
     int near_links, near_angles;
+    /* Of the angles listed: how far their four ends may move in all before a sweep must look at them, m. By
+     * joint: where it was when they were listed, and how far it is from there as a complete sweep starts. */
+    double *calm, *listed_x, *strayed;
     /* Of them and of the contacts those that the last complete sweep found at work or nearly so. */
     int *hot_link, *hot_angle, *hot_contact;
     int hot_links, hot_angles, hot_contacts;
@@ -260,17 +265,20 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, int sweep, double fr
  * few are enough where few lengths are beyond. Forgets the links' corrections. False where some still are,
  * and at once where panels or prescribed lengths hang all together. */
 bool morph_blanket_sweep_lengths(morph_blanket_state *b, double *x);
-/* The panel's volume over the size of its gradient, a length, and the gradient of norm 1 by bottom and top of
- * either post. False where it has no direction. */
-bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
-                             double grad[4][3]);
-double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
-/* The same with its gradient by the angle's joints, those held 0; false where it has none. */
+/* The cosine with its gradient by the angle's joints, those held 0; false where it has none. */
 bool morph_blanket_cosine_gradient(const morph_blanket_state *b, int angle, const double *x, double *c,
                                    double grad[4][3]);
 double morph_blanket_cosine(const morph_blanket_state *b, int angle, const double *x);
 /* Posts by corrections along their direction in `before`, as the leapfrog's symmetry asks. */
 void morph_blanket_project_posts_along(morph_blanket_state *b);
+/* blanket_panel.c */
+/* The panel's volume over the size of its gradient, a length, and the gradient of norm 1 by bottom and top of
+ * either post. False where it has no direction. */
+bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
+                             double grad[4][3]);
+double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x);
+void morph_blanket_project_panel(const morph_blanket_state *b, int panel, double *x); /* into its plane */
+
 /* blanket_polish.c: what the unpolished state breaks. */
 morph_violation morph_blanket_violation(const morph_blanket_state *b, const double *x);
 /* blanket_polish.c: sweeps until x holds the structure's own limits or stops improving; contact by the exact
@@ -338,6 +346,9 @@ double morph_blanket_depth_exact(morph_blanket_state *b, const double *x);
 /* At least how far an element is from the target beyond its radius, by its last exact distance: corners as
  * the target sees them. Negative infinity where nothing is known. */
 double morph_blanket_gap_bound(const morph_blanket_state *b, int element, const double v[3][3]);
+/* Whether an element's axis or middle is further than `reach` from the target at `before`, by its last exact
+ * distance and how far it has come since: cheaper than the bound above, and seldom as good. */
+bool morph_blanket_is_far(const morph_blanket_state *b, int element, double reach);
 /* Planes anew between a convex target and what those known no longer keep from it at x: for the guard. */
 void morph_blanket_renew_planes(morph_blanket_state *b);
 /* Puts the seeking places where exact distances have found elements deepest: a thin part of the target

@@ -116,6 +116,9 @@ morph_violation morph_blanket_polish(morph_blanket_state *b, double *x) {
         memcpy(b->touch_wake, b->spare_wake, wake);
         memcpy(b->span_wake, b->spare_wake + b->touches, spans);
     }
+    /* Moved in place, elements have come further than their paths tell. */
+    for (int n = 0; n < b->links + b->structure->skin_triangles && x == b->x; n++)
+        b->memo[n].been = -INFINITY;
     if (b->exact && b->sdf) morph_blanket_seek_deepest(b);
     return v;
 }

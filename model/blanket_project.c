@@ -15,6 +15,8 @@
 /* Rows whose correction moves no joint further than this, spacings, are left alone until the next complete
  * sweep: a hundredth of the limits' margins. */
 #define STILL 1e-5
+/* Relative error of a post's squared length that is taken for rounding; a projection leaves some 4e-16. */
+#define POST_RIGHT 2e-15
 /* Every so many sweeps one is complete. */
 #define COMPLETE 6
 
@@ -72,6 +74,10 @@ morph_status morph_blanket_limits_create(morph_blanket_state *b) {
     b->angle_wake = morph_alloc((size_t)b->angles, sizeof *b->angle_wake);
     b->hot_link = morph_alloc((size_t)b->links, sizeof *b->hot_link);
     b->hot_angle = morph_alloc((size_t)b->angles, sizeof *b->hot_angle);
+    b->calm = morph_alloc((size_t)b->angles, sizeof *b->calm);
+    b->listed_x = morph_alloc(3 * (size_t)b->joints, sizeof *b->listed_x);
+    b->strayed = morph_alloc((size_t)b->joints, sizeof *b->strayed);
+    if (!b->calm || !b->listed_x || !b->strayed) return MORPH_ERR_NOMEM;
     if (!b->angle_far || !b->turn || !b->come || !b->link_wake || !b->near_link || !b->near_angle ||
         !b->angle_wake || !b->hot_link || !b->hot_angle)
         return MORPH_ERR_NOMEM;
@@ -108,12 +114,12 @@ static void note(morph_blanket_state *b, double motion) {
 }
 
 /* Moves two joints apart by q d, each by its weight's share; two held ones stay. */
-static void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj, const double d[3],
-                 double q) {
+static inline void part(const morph_blanket_state *b, const int ends[2], double *xi, double *xj,
+                        const double d[3], double q) {
     const double wi = b->weight[ends[0]], wj = b->weight[ends[1]];
     double qi = 0.5 * q, qj = qi;
-    if (wi + wj == 0.0) return;
-    if (wi != wj) {
+    if (wi != 1.0 || wj != 1.0) {
+        if (wi + wj == 0.0) return;
         qi = q * (wi / (wi + wj));
         qj = q * (wj / (wi + wj));
     }
@@ -141,16 +147,17 @@ void morph_blanket_project_posts_along(morph_blanket_state *b) {
     }
 }
 
-/* Posts share no joint, so this one is exact. */
+/* Posts share no joint, so this one is exact. What no sweep has moved since is still right, to rounding. */
 static void project_posts(morph_blanket_state *b, double *x) {
     const morph_structure *s = b->structure;
     for (int p = 0; p < b->posts; p++) {
         double *xb = &x[3 * s->post[p][0]], *xt = &x[3 * s->post[p][1]], d[3];
         morph_sub(xt, xb, d);
-        const double length = morph_norm(d);
-        if (!(length > 0.0)) continue;
-        note(b, s->post_length[p] - length);
-        part(b, s->post[p], xb, xt, d, s->post_length[p] / length - 1.0);
+        const double square = morph_dot(d, d), wanted = s->post_length[p];
+        if (fabs(square - wanted * wanted) <= POST_RIGHT * square || !(square > 0.0)) continue;
+        const double length = sqrt(square);
+        note(b, wanted - length);
+        part(b, s->post[p], xb, xt, d, wanted / length - 1.0);
     }
 }
 
@@ -200,6 +207,14 @@ static inline void arms(const morph_turn *a, const double *x, double u[3], doubl
     morph_sub(&x[3 * a->v[1]], &x[3 * a->v[0]], v);
 }
 
+static inline void add_gradient(const morph_angle *a, int j, const double gu[3], const double gv[3],
+                                double (*grad)[3], double *square) {
+    const double w = a->weight[j], su = a->su[j], sv = a->sv[j];
+    for (int k = 0; k < 3; k++)
+        grad[j][k] = w * (su * gu[k] + sv * gv[k]);
+    *square += morph_dot(grad[j], grad[j]);
+}
+
 /* c = cos(u, v) = u.v / (|u||v|);  dc/du = (v/|v| - c u/|u|) / |u|, dc/dv likewise; a joint's gradient is
  * su dc/du + sv dc/dv, times its weight. Returns the sum of the gradients' squares; 0 where the arms are
  * parallel, which the limits keep far from, or all joints are held. arm: the shorter arm's length. grad may
@@ -218,11 +233,10 @@ static double cosine(const morph_turn *t, const morph_angle *a, const double *x,
         gu[k] = v[k] * one - cu * u[k];
         gv[k] = u[k] * one - cv * v[k];
     }
-    for (int j = 0; j < a->joints; j++) {
-        for (int k = 0; k < 3; k++)
-            grad[j][k] = a->weight[j] * (a->su[j] * gu[k] + a->sv[j] * gv[k]);
-        square += morph_dot(grad[j], grad[j]);
-    }
+    add_gradient(a, 0, gu, gv, grad, &square);
+    add_gradient(a, 1, gu, gv, grad, &square);
+    add_gradient(a, 2, gu, gv, grad, &square);
+    if (a->joints > 3) add_gradient(a, 3, gu, gv, grad, &square);
     return square * scale > 1e-12 ? square : 0.0;
 }
 
@@ -246,15 +260,18 @@ static bool link_near(morph_blanket_state *b, int l, const double *x, double nea
 /* With the ends of an arm of length a moving by m in all, it turns by at most m / (a - m); the cosine changes
  * by at most the sum of both turns: with m for both it keeps a distance g where m <= g a / (1 + g). */
 static bool angle_near(const morph_blanket_state *b, const morph_turn *a, const double *x, double near,
-                       double path, bool note) {
+                       double path, bool note, double *calm) {
     double u[3], v[3];
     arms(a, x, u, v);
     const double uu = morph_dot(u, u), vv = morph_dot(v, v), scale = sqrt(uu * vv);
+    *calm = 0.0;
     if (!(scale > 0.0)) return true;
     const double c = morph_dot(u, v) / scale, high = a->ceiling - c, low = c - a->floor;
     const double gap = high < low ? high : low;
     if (!(gap > 0.0)) return true;
-    const double spare = gap * sqrt(uu < vv ? uu : vv) / (1.0 + gap) - near;
+    const double arm = sqrt(uu < vv ? uu : vv), cool = gap - HOT_COSINE;
+    const double spare = gap * arm / (1.0 + gap) - near;
+    if (cool > 0.0) *calm = cool * arm / (1.0 + cool);
     if (note && spare > 0.0) b->angle_wake[a - b->turn] = path + spare;
     return !(spare > 0.0);
 }
@@ -275,6 +292,7 @@ static void list_links(morph_blanket_state *b, const double *x, double add, bool
 
 void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all) {
     const double add = b->added, *move = b->move;
+    memcpy(b->listed_x, x, 3 * (size_t)b->joints * sizeof *x);
     for (int j = 0; j < b->joints; j++)
         b->come[j] = b->path[j] + move[j];
     list_links(b, x, add, all);
@@ -284,7 +302,7 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all
         const double come = b->come[a->u[0]] + b->come[a->u[1]] + b->come[a->v[0]] + b->come[a->v[1]];
         if (!all && come + 4.0 * add < b->angle_wake[t]) continue;
         const double own = all ? 0.0 : move[a->u[0]] + move[a->u[1]] + move[a->v[0]] + move[a->v[1]];
-        if (angle_near(b, a, x, 4.0 * add + own, come - own, !all))
+        if (angle_near(b, a, x, 4.0 * add + own, come - own, !all, &b->calm[b->near_angles]))
             b->near_angle[b->near_angles++] = t;
         else
             a->push[0] = a->push[1] = 0.0;
@@ -301,10 +319,18 @@ static double clip(double value, double most) {
     return value > most ? most : value < -most ? -most : value;
 }
 
-static void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
-    for (int j = 0; j < a->joints; j++)
-        for (int k = 0; k < 3; k++)
-            x[3 * a->joint[j] + k] += change * grad[j][k];
+static inline void move(double *x, const double d[3], double by) {
+    x[0] += by * d[0];
+    x[1] += by * d[1];
+    x[2] += by * d[2];
+}
+
+/* An angle has at least three joints. */
+static inline void turn(const morph_angle *a, double *x, const double (*grad)[3], double change) {
+    move(&x[3 * a->joint[0]], grad[0], change);
+    move(&x[3 * a->joint[1]], grad[1], change);
+    move(&x[3 * a->joint[2]], grad[2], change);
+    if (a->joints > 3) move(&x[3 * a->joint[3]], grad[3], change);
 }
 
 /* Whether floor < cos(u, v) < ceiling, without root or division; false where it cannot be told so. */
@@ -326,12 +352,18 @@ static double correct_angle(morph_turn *t, const morph_angle *a, double *x, doub
     return change * a->size;
 }
 
+/* Sum of the gradients times the joints. */
+static inline double along(const morph_angle *a, const double *x) {
+    double sum = morph_dot(a->grad[0], &x[3 * a->joint[0]]) + morph_dot(a->grad[1], &x[3 * a->joint[1]]) +
+                 morph_dot(a->grad[2], &x[3 * a->joint[2]]);
+    if (a->joints > 3) sum += morph_dot(a->grad[3], &x[3 * a->joint[3]]);
+    return sum;
+}
+
 /* Between complete sweeps the cosine is taken as linear: joints move by fractions of HOT_LENGTH (or all
  * sweeps are complete), over which its second derivatives, at most 4 / arm^2, change it by less than 1e-4. */
 static double linear_angle(morph_turn *t, const morph_angle *a, double *x) {
-    double c = a->level;
-    for (int j = 0; j < a->joints; j++)
-        c += morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    const double c = a->level + along(a, x);
     return at_work(t) || c < t->floor || c > t->ceiling ? correct_angle(t, a, x, c) : 0.0;
 }
 
@@ -353,9 +385,7 @@ static bool project_angle(morph_turn *t, morph_angle *a, double *x, double *moti
     a->inverse = 1.0 / square;
     a->most = 0.5 * arm / a->size;
     a->linear = true;
-    a->level = c;
-    for (int j = 0; j < a->joints; j++)
-        a->level -= morph_dot(a->grad[j], &x[3 * a->joint[j]]);
+    a->level = c - along(a, x);
     *motion = correct_angle(t, a, x, c);
     return true;
 }
@@ -368,69 +398,6 @@ static void start_angle(morph_turn *t, const morph_angle *a, double *x, double w
     t->push[0] = fmin(warm * t->push[0], limit);
     t->push[1] = fmin(warm * t->push[1], limit);
     if (square > 0.0) turn(a, x, (const double(*)[3])grad, t->push[0] - t->push[1]);
-}
-
-/* Volume of a panel's four corners, six times: det[p, r, d] with the posts p and r and d between their feet.
- * By a's bottom and top, then b's: grad = -(r x d) - p x r, r x d, -(d x p) + p x r, d x p. */
-static double panel_volume(const morph_structure *s, int panel, const double *x, const double *corner[4],
-                           double grad[4][3]) {
-    const int *a = s->post[s->panel[panel][0]], *b = s->post[s->panel[panel][1]];
-    const int joint[4] = {a[0], a[1], b[0], b[1]};
-    double p[3], r[3], d[3], pr[3], rd[3], dp[3];
-    for (int k = 0; k < 4; k++)
-        corner[k] = &x[3 * joint[k]];
-    morph_sub(corner[1], corner[0], p);
-    morph_sub(corner[3], corner[2], r);
-    morph_sub(corner[2], corner[0], d);
-    morph_cross(p, r, pr);
-    morph_cross(r, d, rd);
-    morph_cross(d, p, dp);
-    for (int k = 0; k < 3; k++) {
-        grad[0][k] = -rd[k] - pr[k];
-        grad[1][k] = rd[k];
-        grad[2][k] = -dp[k] + pr[k];
-        grad[3][k] = dp[k];
-    }
-    return morph_dot(pr, d);
-}
-
-/* Sine of the angle by which a panel is out of plane. */
-double morph_blanket_panel_sine(const morph_structure *s, int panel, const double *x) {
-    const double *corner[4];
-    double grad[4][3];
-    const double volume = panel_volume(s, panel, x, corner, grad);
-    const double scale = morph_dist(corner[0], corner[1]) * morph_dist(corner[2], corner[3]) *
-                         morph_dist(corner[0], corner[2]);
-    return scale > 0.0 ? volume / scale : 0.0;
-}
-
-bool morph_blanket_panel_row(const morph_structure *s, int panel, const double *x, double *residual,
-                             double grad[4][3]) {
-    const double *corner[4];
-    const double volume = panel_volume(s, panel, x, corner, grad);
-    double square = 0.0;
-    for (int k = 0; k < 4; k++)
-        square += morph_dot(grad[k], grad[k]);
-    const double size = sqrt(square);
-    *residual = size > 0.0 ? volume / size : 0.0;
-    for (int k = 0; k < 12 && size > 0.0; k++)
-        grad[k / 3][k % 3] /= size;
-    return size > 0.0;
-}
-
-static void project_panel(const morph_blanket_state *b, int panel, double *x) {
-    const morph_structure *s = b->structure;
-    const double *corner[4];
-    double grad[4][3], square = 0.0;
-    const double volume = panel_volume(s, panel, x, corner, grad);
-    for (int k = 0; k < 4; k++)
-        square += b->weight[(corner[k] - x) / 3] * morph_dot(grad[k], grad[k]);
-    if (!(square > 0.0)) return;
-    for (int k = 0; k < 4; k++) {
-        const ptrdiff_t joint = (corner[k] - x) / 3;
-        for (int m = 0; m < 3; m++)
-            x[3 * joint + m] -= volume / square * b->weight[joint] * grad[k][m];
-    }
 }
 
 /* What carries weight moves joints by a few times its acceleration times step^2 every step. An impact's
@@ -446,12 +413,26 @@ void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm)
     project_posts(b, x);
 }
 
-/* All listed rows; lists those that are hot. */
+/* How far every joint is from where the limits were listed. */
+static void note_strayed(morph_blanket_state *b, const double *x) {
+    for (int j = 0; j < b->joints; j++)
+        b->strayed[j] = morph_dist(&x[3 * j], &b->listed_x[3 * j]);
+}
+
+/* Nothing pushes at the angle and its ends have not moved enough to bring it near a limit. */
+static bool is_calm(const morph_blanket_state *b, const morph_turn *a, double calm) {
+    const double *moved = b->strayed;
+    return moved[a->u[0]] + moved[a->u[1]] + moved[a->v[0]] + moved[a->v[1]] < calm && !at_work(a);
+}
+
+/* All listed rows that are not calm; lists those that are hot. */
 static void sweep_complete(morph_blanket_state *b, double *x, bool backward) {
     double motion;
     b->hot_angles = b->hot_links = b->hot_contacts = 0;
+    note_strayed(b, x);
     for (int t = 0; t < b->near_angles; t++) {
-        const int angle = b->near_angle[backward ? b->near_angles - 1 - t : t];
+        const int at = backward ? b->near_angles - 1 - t : t, angle = b->near_angle[at];
+        if (is_calm(b, &b->turn[angle], b->calm[at])) continue;
         if (project_angle(&b->turn[angle], &b->angle[angle], x, &motion))
             b->hot_angle[b->hot_angles++] = angle;
         note(b, motion);
@@ -495,11 +476,20 @@ static void sweep_hot(morph_blanket_state *b, double *x, bool backward) {
     b->hot_links = close_up(b->hot_link, b->hot_links, kept, backward);
 }
 
+/* Nothing pushes at the contact and its corners have not moved enough to bring it near. */
+static bool is_clear(const morph_blanket_state *b, const morph_contact *c, double hot) {
+    double moved = 0.0;
+    for (int k = 0; k < c->corners; k++)
+        if (b->strayed[c->joint[k]] > moved) moved = b->strayed[c->joint[k]];
+    return moved < c->spare - hot && c->push == 0.0;
+}
+
 static void sweep_contacts(morph_blanket_state *b, double *x, bool complete, bool backward, double friction) {
     const double hot = HOT_LENGTH * b->structure->spacing, still = STILL * b->structure->spacing;
     for (int n = 0; n < b->contacts && complete; n++) {
         double gap;
         const int contact = backward ? b->contacts - 1 - n : n;
+        if (is_clear(b, &b->contact[contact], hot)) continue;
         note(b, morph_blanket_project_contact(&b->contact[contact], x, friction, &gap));
         if (gap < hot || b->contact[contact].push > 0.0) b->hot_contact[b->hot_contacts++] = contact;
     }
@@ -527,7 +517,7 @@ void morph_blanket_sweep(morph_blanket_state *b, double *x, int sweep, double fr
         sweep_hot(b, x, backward != b->hot_backward);
     const int panels = b->structure->panels;
     for (int p = 0; p < panels; p++)
-        project_panel(b, backward ? panels - 1 - p : p, x);
+        morph_blanket_project_panel(b, backward ? panels - 1 - p : p, x);
     note(b, morph_blanket_project_self(b, x, backward));
     sweep_contacts(b, x, complete, complete ? backward : backward != b->hot_backward, friction);
     if (b->soft) morph_blanket_soft_sweep(b, x, backward, friction);

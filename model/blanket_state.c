@@ -112,6 +112,9 @@ void morph_blanket_state_destroy(morph_blanket_state *b) {
     free(b->hot_contact);
     free(b->held);
     free(b->near_link);
+    free(b->calm);
+    free(b->listed_x);
+    free(b->strayed);
     free(b->near_angle);
     free(b->push);
     free(b->angle);

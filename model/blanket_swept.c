@@ -25,7 +25,7 @@ enum { MOST_NEAR = 256 };
  * all of the target, or the motion is so fast (blanket.c, FAST) that impacts push what is in contact through.
  */
 #define SHORT_MOVE 0.1
-#define FAST 0.15 /* spacings in the step that forces ask for */
+#define FAST 0.175 /* spacings in the step that forces ask for */
 /* Elements are watched while they are nearer than this, spacings: what is further cannot reach the target in
  * a step (blanket.c, MOST_MOVE). */
 #define WATCH 0.5
@@ -295,9 +295,11 @@ bool morph_blanket_guard(morph_blanket_state *b) {
     const morph_structure *s = b->structure;
     int crossed = 0;
     b->guard.steps++;
+    const double move = morph_blanket_moved(b, b->x) + fabs(b->lift_to - b->lift);
     /* All of them: each is watched from now on. */
     for (int n = 0; n < s->links + s->skin_triangles; n++) {
         element e;
+        if (!b->soft && morph_blanket_is_far(b, n, move)) continue;
         if (!set_element(b, n, &e)) continue;
         if (b->soft ? crosses_soft(b, &e) : crosses_rigid(b, &e)) crossed = n + 1;
     }

@@ -25,6 +25,7 @@
 struct morph_sdf {
     int n[3];                     /* nodes */
     double lo[3], hi[3], cell[3]; /* cell: exact spacing per axis */
+    double inverse[3];            /* 1 / cell */
     double width;                 /* w above */
     size_t stride[2];             /* of x and y in `c`; z is 1 */
     double *c;                    /* (n[0]+2)(n[1]+2)(n[2]+2) coefficients, one beyond each end */
@@ -201,6 +202,7 @@ static morph_status build(morph_sdf *s, const morph_distance *exact, const doubl
         if (!(total < MAX_NODES)) return MORPH_ERR_NOMEM;
         s->n[k] = (int)fmax(cells, MIN_NODES - 1) + 1;
         s->cell[k] = (hi[k] - lo[k]) / (s->n[k] - 1);
+        s->inverse[k] = 1 / s->cell[k];
         s->lo[k] = lo[k];
         s->hi[k] = hi[k];
         s->width = fmax(s->width, 2 * s->cell[k]);
@@ -230,26 +232,50 @@ morph_status morph_sdf_create(const morph_distance *exact, const double lo[3], c
     return MORPH_OK;
 }
 
-/* Weights of 4 neighbouring coefficients for value, first and second derivative at coordinate x of an axis;
- * straight on beyond the ends (the second derivative of the spline is 0 there). Returns the first's index. */
-static size_t axis_weights(const morph_sdf *s, int axis, double x, double w[3][4]) {
-    const double inverse = 1 / s->cell[axis];
+/* Two numbers side by side, each with the same operations as alone. */
+typedef double two __attribute__((vector_size(16)));
+
+/* Where coordinate x lies on an axis: u cells from the second of 4 neighbouring coefficients, of which the
+ * first's index is returned. Sets their weights for the value and its derivative. *beyond: past the ends. */
+static inline size_t axis_cell(const morph_sdf *s, int axis, double x, double *at, double *beyond,
+                               double w[2][4]) {
+    const double inverse = s->inverse[axis];
     const double t = (x - s->lo[axis]) * inverse, last = s->n[axis] - 1;
     const double inside = t < 0 ? 0 : t > last ? last : t;
     int i = (int)inside;
     if (i > s->n[axis] - 2) i = s->n[axis] - 2;
-    const double u = inside - i, v = 1 - u, beyond = t - inside;
-    w[0][0] = v * v * v / 6;
-    w[0][1] = (4 + u * u * (3 * u - 6)) / 6;
-    w[0][2] = (4 + v * v * (3 * v - 6)) / 6;
-    w[0][3] = u * u * u / 6;
+    const double u = inside - i, v = 1 - u;
+    const two vu = {v, u}, outer = vu * vu * vu / 6, inner = (4 + vu * vu * (3 * vu - 6)) / 6;
+    *at = u;
+    *beyond = t - inside;
+    w[0][0] = outer[0];
+    w[0][1] = inner[1];
+    w[0][2] = inner[0];
+    w[0][3] = outer[1];
     w[1][0] = -v * v / 2;
     w[1][1] = u * (1.5 * u - 2);
     w[1][2] = -v * (1.5 * v - 2);
     w[1][3] = u * u / 2;
-    w[2][0] = v;
+    return (size_t)i;
+}
+
+/* Inside the box. */
+static inline size_t slope_weights(const morph_sdf *s, int axis, double x, double w[2][4]) {
+    double at, beyond;
+    const size_t i = axis_cell(s, axis, x, &at, &beyond, w);
+    for (int m = 0; m < 4; m++)
+        w[1][m] *= s->inverse[axis];
+    return i;
+}
+
+/* Also beyond it, straight on, and with the second derivative, which is 0 there. */
+static size_t axis_weights(const morph_sdf *s, int axis, double x, double w[3][4]) {
+    const double inverse = s->inverse[axis];
+    double u, beyond;
+    const size_t i = axis_cell(s, axis, x, &u, &beyond, w);
+    w[2][0] = 1 - u;
     w[2][1] = 3 * u - 2;
-    w[2][2] = 3 * v - 2;
+    w[2][2] = 3 * (1 - u) - 2;
     w[2][3] = u;
     for (int m = 0; m < 4; m++) {
         if (beyond != 0) {
@@ -259,7 +285,7 @@ static size_t axis_weights(const morph_sdf *s, int axis, double x, double w[3][4
         w[1][m] *= inverse;
         w[2][m] *= inverse * inverse;
     }
-    return (size_t)i;
+    return i;
 }
 
 /* The spline at p, straight on beyond the box: contracted along z, then y, then x; each step keeps the
@@ -298,16 +324,33 @@ static void spline(const morph_sdf *s, const double p[3], double out[10]) {
     }
 }
 
+/* Coefficients k of two rows side by side. */
+static inline two of_rows(const double *q, const double *r, int k) {
+    return (two){q[k], r[k]};
+}
+
+/* Along z, for rows q and r. */
+static inline two along(const double w[4], const two c[4]) {
+    return w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3];
+}
+
+/* The value alone, inside the box. */
 static double spline_value(const morph_sdf *s, const double p[3]) {
-    double wx[3][4], wy[3][4], wz[3][4], sum = 0;
-    const size_t ix = axis_weights(s, 0, p[0], wx), iy = axis_weights(s, 1, p[1], wy),
-                 iz = axis_weights(s, 2, p[2], wz);
-    const double *c = s->c + ix * s->stride[0] + iy * s->stride[1] + iz;
-    for (int a = 0; a < 4; a++) {
+    double wx[2][4], wy[2][4], wz[2][4], sum = 0, at, beyond;
+    const size_t ix = axis_cell(s, 0, p[0], &at, &beyond, wx), iy = axis_cell(s, 1, p[1], &at, &beyond, wy),
+                 iz = axis_cell(s, 2, p[2], &at, &beyond, wz);
+    const double *q = s->c + ix * s->stride[0] + iy * s->stride[1] + iz;
+    const size_t row = s->stride[1];
+    for (int a = 0; a < 4; a++, q += s->stride[0]) {
         double f = 0;
-        for (int b = 0; b < 4; b++) {
-            const double *q = c + (size_t)a * s->stride[0] + (size_t)b * s->stride[1];
-            f += wy[0][b] * (wz[0][0] * q[0] + wz[0][1] * q[1] + wz[0][2] * q[2] + wz[0][3] * q[3]);
+#pragma GCC unroll 2
+        for (int b = 0; b < 4; b += 2) {
+            const double *r = q + (size_t)b * row;
+            const two c[4] = {of_rows(r, r + row, 0), of_rows(r, r + row, 1), of_rows(r, r + row, 2),
+                              of_rows(r, r + row, 3)};
+            const two v = along(wz[0], c);
+            f += wy[0][b] * v[0];
+            f += wy[0][b + 1] * v[1];
         }
         sum += wx[0][a] * f;
     }
@@ -316,21 +359,26 @@ static double spline_value(const morph_sdf *s, const double p[3]) {
 
 /* Value and gradient alone, inside the box: half the work. out: value, x, y, z. */
 static void spline_gradient(const morph_sdf *s, const double p[3], double out[4]) {
-    double wx[3][4], wy[3][4], wz[3][4];
-    const size_t ix = axis_weights(s, 0, p[0], wx), iy = axis_weights(s, 1, p[1], wy),
-                 iz = axis_weights(s, 2, p[2], wz);
-    const double *c = s->c + ix * s->stride[0] + iy * s->stride[1] + iz;
+    double wx[2][4], wy[2][4], wz[2][4];
+    const size_t ix = slope_weights(s, 0, p[0], wx), iy = slope_weights(s, 1, p[1], wy),
+                 iz = slope_weights(s, 2, p[2], wz);
+    const double *q = s->c + ix * s->stride[0] + iy * s->stride[1] + iz;
+    const size_t row = s->stride[1];
     double value = 0, gx = 0, gy = 0, gz = 0;
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 4; a++, q += s->stride[0]) {
         double f = 0, fy = 0, fz = 0;
-        const double *plane = c + (size_t)a * s->stride[0];
-        for (int b = 0; b < 4; b++) {
-            const double *q = plane + (size_t)b * s->stride[1];
-            const double v = wz[0][0] * q[0] + wz[0][1] * q[1] + wz[0][2] * q[2] + wz[0][3] * q[3];
-            const double vz = wz[1][0] * q[0] + wz[1][1] * q[1] + wz[1][2] * q[2] + wz[1][3] * q[3];
-            f += wy[0][b] * v;
-            fy += wy[1][b] * v;
-            fz += wy[0][b] * vz;
+#pragma GCC unroll 2
+        for (int b = 0; b < 4; b += 2) {
+            const double *r = q + (size_t)b * row;
+            const two c[4] = {of_rows(r, r + row, 0), of_rows(r, r + row, 1), of_rows(r, r + row, 2),
+                              of_rows(r, r + row, 3)};
+            const two v = along(wz[0], c), vz = along(wz[1], c);
+            f += wy[0][b] * v[0];
+            fy += wy[1][b] * v[0];
+            fz += wy[0][b] * vz[0];
+            f += wy[0][b + 1] * v[1];
+            fy += wy[1][b + 1] * v[1];
+            fz += wy[0][b + 1] * vz[1];
         }
         value += wx[0][a] * f;
         gx += wx[1][a] * f;
