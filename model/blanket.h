@@ -102,9 +102,9 @@ typedef struct morph_blanket_report {
  * the motion where between its places parts of the target come through. report may be NULL. On
  * MORPH_ERR_STOPPED the frames so far are in *out; on any other failure *out is empty. MORPH_ERR_NONFINITE if
  * x0 is not finite, or the motion cannot be kept from growing without cause; MORPH_ERR_MOTION if it cannot be
- * kept from coming through the target (report->came_through); MORPH_ERR_INPUT for a negative or non-finite def, a joint that
- * does not exist, or more than 1e6 frames or steps a frame (of the blanket or of the body), a body beside a
- * rigid target. */
+ * kept from coming through the target (report->came_through); MORPH_ERR_INPUT for a negative or non-finite
+ * def, a joint that does not exist, or more than 1e6 frames or steps a frame (of the blanket or of the body),
+ * a body beside a rigid target. */
 morph_status morph_blanket_run(const morph_structure *structure, const morph_sdf *sdf,
                                const morph_distance *exact, const morph_blanket_def *def, const double *x0,
                                const morph_control *control, morph_trajectory *out,

@@ -13,6 +13,9 @@ typedef morph_status (*morph_proposal)(const morph_workspace *w, morph_balance *
                                        const morph_placement_options *options, double moves, double seconds,
                                        const morph_rest *rest, double **z, morph_nlp_result *result);
 
+/* The options' own. */
+morph_proposal morph_proposal_of(const morph_placement_options *options);
+
 /* By NLopt, without gradients and with them (placement_search.c). */
 morph_status morph_propose_free(const morph_workspace *w, morph_balance *b,
                                 const morph_placement_options *options, double moves, double seconds,
