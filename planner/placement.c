@@ -86,7 +86,7 @@ static morph_status round_of(morph_placer *p, const morph_attractor *centre, int
             "predicted %.4g, reached %.4g, %.3f spacings apart",
             centres, centres == 1 ? "" : "s", p->reach, result.solver_text, result.iterations,
             result.unknowns, result.seconds, p->objective, t.predicted, reached, t.difference);
-        if (p->options->method == MORPH_PLACE_IPOPT) status = morph_trial_along(p, centre, &t);
+        if (p->bold) status = morph_trial_along(p, centre, &t);
     }
     if (status == MORPH_OK) {
         const double reached = morph_placer_objective(p, &t.measure);
@@ -107,6 +107,9 @@ static morph_status round_of(morph_placer *p, const morph_attractor *centre, int
 
 /* A round that had no success with this has no other to hope for: steps as short as friction holds. */
 #define LEAST_REACH 0.15
+
+/* Fewer lead nowhere from the seeds. */
+enum { FEWEST_ROUNDS = 3 };
 
 /* Rounds with a number of centres until they gain little. The first starts from `centre`. */
 static morph_status rounds(morph_placer *p, const morph_attractor *centre, int centres) {
@@ -149,6 +152,47 @@ static morph_status grow(morph_placer *p) {
     return status;
 }
 
+/* The first way found stands while another is tried. */
+typedef struct stand {
+    morph_placement placement; /* owns its frames */
+    double objective;
+} stand;
+
+static stand put_by(morph_placer *p) {
+    const stand s = {*p->out, p->objective};
+    p->out->guided = (morph_trajectory){0};
+    return s;
+}
+
+/* Back to the way that was put by; what it cost to try the other counts. */
+static void take_back(morph_placer *p, const stand *s) {
+    const morph_placement tried = *p->out;
+    morph_trajectory_free(&p->out->guided);
+    *p->out = s->placement;
+    p->out->rounds = tried.rounds;
+    p->out->accepted = tried.accepted;
+    p->out->effort = tried.effort;
+    p->objective = s->objective;
+    morph_placer_stand(p, morph_placer_end(p, &p->out->guided));
+}
+
+/* Long steps are quick and may end where friction lets no other follow: the rounds that they left over go
+ * from the seeds with the programs' own steps. */
+static morph_status cautiously(morph_placer *p) {
+    if (p->options->rounds - p->out->rounds < FEWEST_ROUNDS || morph_placer_late(p)) return MORPH_OK;
+    stand first = put_by(p);
+    p->bold = false;
+    morph_status status = run_seeds(p);
+    if (status == MORPH_OK) status = rounds(p, p->out->seed, p->out->seeds);
+    if (status == MORPH_OK) status = grow(p);
+    if (p->out->guided.frames > 0 && p->objective < first.objective)
+        morph_trajectory_free(&first.placement.guided);
+    else
+        take_back(p, &first);
+    p->bold = true;
+    return status;
+}
+
 /* From the start, under the centres found: less friction may lie on that way. Where it is better, rounds go
  * on from there. */
 static morph_status again(morph_placer *p) {
@@ -171,7 +215,8 @@ static morph_status place(morph_placer *p, const double *x0) {
     status = run_seeds(p);
     if (status == MORPH_OK) status = rounds(p, out->seed, out->seeds);
     if (status == MORPH_OK) status = grow(p);
-    if (status == MORPH_OK && p->options->method == MORPH_PLACE_IPOPT) status = again(p);
+    if (status == MORPH_OK && p->bold) status = cautiously(p);
+    if (status == MORPH_OK && p->bold) status = again(p);
     if (status == MORPH_OK) status = morph_placement_last(p);
     return status;
 }
@@ -180,6 +225,7 @@ morph_status morph_placement_run(const morph_workspace *w, const morph_scene *sc
                                  const morph_placement_options *options, morph_placement *out) {
     *out = (morph_placement){0};
     morph_placer p = {.w = w, .scene = scene, .options = options, .out = out, .started = morph_seconds()};
+    p.bold = options->method == MORPH_PLACE_IPOPT;
     p.unit = morph_balance_unit(&scene->structure, scene->motion.gravity);
     const size_t width = 3 * (size_t)w->structure->joints;
     if (options->control) {

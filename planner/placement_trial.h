@@ -13,6 +13,7 @@ typedef struct morph_placer {
     morph_placement *out;
     double unit;        /* a joint's weight, N */
     double reach;       /* of the next round, spacings */
+    bool bold;          /* the blanket is asked along a program's way too */
     double *x, *scaled; /* 3*joints: where the blanket rests, m, and in spacings */
     double objective;   /* there, spacings^4 */
     morph_control quiet;
