@@ -26,7 +26,7 @@ morph_placement_options morph_placement_defaults(void) {
                                      .epsilon = 1e-3,
                                      .last_epsilon = 9e-7,
                                      .iterations = 60,
-                                     .last_iterations = 250,
+                                     .last_iterations = 150,
                                      .rounds = 8,
                                      .most_centres = 3};
 }
@@ -62,14 +62,16 @@ morph_proposal morph_proposal_of(const morph_placement_options *options) {
     return by[options->method];
 }
 
-/* One round from where the blanket rests: *gain is what the blanket gained, 0 if nothing. */
-static morph_status round_of(morph_placer *p, const morph_attractor *centre, int centres, double *gain) {
+/* One round from where the blanket rests: *gain is what the blanket gained, 0 if nothing; *hope what the
+ * program promised. */
+static morph_status round_of(morph_placer *p, const morph_attractor *centre, int centres, double *gain,
+                             double *hope) {
     morph_balance *b = NULL;
     morph_rest rest;
     morph_nlp_result result = {0};
     double *z = NULL;
     morph_trial t = {0};
-    *gain = 0.0;
+    *gain = *hope = 0.0;
     morph_status status = morph_placer_adopt(p, centre, centres, p->options->epsilon, &b, &rest);
     if (status == MORPH_OK)
         status = morph_proposal_of(p->options)(p->w, b, p->options, p->reach, morph_placer_left(p), &rest, &z,
@@ -86,6 +88,7 @@ static morph_status round_of(morph_placer *p, const morph_attractor *centre, int
             "predicted %.4g, reached %.4g, %.3f spacings apart",
             centres, centres == 1 ? "" : "s", p->reach, result.solver_text, result.iterations,
             result.unknowns, result.seconds, p->objective, t.predicted, reached, t.difference);
+        *hope = p->objective - t.predicted;
         if (p->bold) status = morph_trial_along(p, centre, &t);
     }
     if (status == MORPH_OK) {
@@ -95,6 +98,11 @@ static morph_status round_of(morph_placer *p, const morph_attractor *centre, int
             status = morph_trial_accept(p, &t);
             p->out->accepted++;
         }
+    }
+    /* A solver that dies, or a motion that cannot be followed, is a round without a gain. */
+    if (status == MORPH_ERR_BACKEND || status == MORPH_ERR_NONFINITE || status == MORPH_ERR_MOTION) {
+        morph_log(p->options->control, "placement: a round is lost: %s", morph_status_text(status));
+        status = MORPH_OK;
     }
     p->out->rounds++;
     morph_trajectory_free(&t.way);
@@ -119,12 +127,13 @@ static morph_status rounds(morph_placer *p, const morph_attractor *centre, int c
     p->reach = p->options->reach;
     while (status == MORPH_OK && p->out->rounds < p->options->rounds && p->reach > LEAST_REACH) {
         const double before = p->objective;
-        double gain;
-        status = round_of(p, from, centres, &gain);
+        double gain, hope;
+        status = round_of(p, from, centres, &gain, &hope);
         if (morph_stopped(p->options->control)) return MORPH_ERR_STOPPED;
         morph_progress(p->options->control, "placement", p->out->rounds / (double)p->options->rounds);
         if (morph_placer_late(p)) break;
-        if (gain > 0.0 && gain < p->options->least_gain * before) break;
+        /* Nothing won, or where nothing was, nothing to be hoped for from a shorter step. */
+        if ((gain > 0.0 ? gain : hope) < p->options->least_gain * before) break;
         p->reach *= gain > 0.0 ? 1.25 : 0.5;
         p->reach = fmin(p->reach, 0.4);
         if (gain > 0.0) memcpy(from, p->out->centre, sizeof from);
@@ -179,7 +188,8 @@ static void take_back(morph_placer *p, const stand *s) {
 /* Long steps are quick and may end where friction lets no other follow: the rounds that they left over go
  * from the seeds with the programs' own steps. */
 static morph_status cautiously(morph_placer *p) {
-    if (p->options->rounds - p->out->rounds < FEWEST_ROUNDS || morph_placer_late(p)) return MORPH_OK;
+    if (!p->leapt || p->options->rounds - p->out->rounds < FEWEST_ROUNDS || morph_placer_late(p))
+        return MORPH_OK;
     stand first = put_by(p);
     p->bold = false;
     morph_status status = run_seeds(p);

@@ -33,7 +33,8 @@ static morph_status settle_down(morph_placer *p, morph_trajectory *way) {
     return status;
 }
 
-/* So little reach may leave contacts no room to close: then three times as much. */
+/* So little reach may leave contacts no room to close: then three times as much. Where iterations ran out,
+ * more room would not help. */
 static morph_status solve(morph_placer *p, morph_balance *b, const morph_rest *rest, double **z,
                           morph_nlp_result *result) {
     morph_placement *out = p->out;
@@ -49,6 +50,7 @@ static morph_status solve(morph_placer *p, morph_balance *b, const morph_rest *r
         if (status != MORPH_OK) break;
         morph_effort_add(&out->effort, result);
         out->solved = result->outcome == MORPH_OPTIMAL;
+        if (result->iterations >= o.iterations) break;
     }
     return status;
 }
@@ -89,6 +91,10 @@ morph_status morph_placement_last(morph_placer *p) {
             if (still.frames > 0) status = morph_trajectory_append(&out->guided, &still);
             if (status == MORPH_OK) status = morph_trial_accept(p, &t);
         }
+    }
+    if (status == MORPH_ERR_BACKEND || status == MORPH_ERR_NONFINITE || status == MORPH_ERR_MOTION) {
+        snprintf(out->reason, sizeof out->reason, "the last program: %s", morph_status_text(status));
+        status = MORPH_OK;
     }
     morph_trajectory_free(&still);
     morph_trajectory_free(&t.way);

@@ -107,6 +107,7 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
         o.mu_init = fmin(FIRST_MU, b->epsilon);
         o.max_iterations = p->options->iterations;
         o.control = &p->quiet;
+        o.isolated = true;
         status = morph_nlp_solve(nlp, NULL, &o, result);
     }
     if (status == MORPH_OK) memcpy(z, result->x, (size_t)n * sizeof *z);

@@ -151,6 +151,7 @@ morph_status morph_trial_along(morph_placer *p, const morph_attractor *from, mor
         if (t.measure.objective < best->measure.objective) {
             morph_trajectory_free(&best->way);
             *best = t;
+            p->leapt |= farther;
         } else {
             morph_trajectory_free(&t.way);
         }

@@ -14,6 +14,7 @@ typedef struct morph_placer {
     double unit;        /* a joint's weight, N */
     double reach;       /* of the next round, spacings */
     bool bold;          /* the blanket is asked along a program's way too */
+    bool leapt;         /* and was better farther along it */
     double *x, *scaled; /* 3*joints: where the blanket rests, m, and in spacings */
     double objective;   /* there, spacings^4 */
     morph_control quiet;

@@ -58,6 +58,7 @@ static morph_status solve_rest(morph_balance *b, morph_rest_energy *energy, doub
         o.max_iterations = 200;
         o.max_seconds = seconds;
         o.control = control;
+        o.isolated = true;
         if (tau) status = start_warm(b, epsilon, x, tau, result);
         if (status == MORPH_OK) status = morph_nlp_solve(nlp, x, &o, result);
     }

@@ -1,7 +1,7 @@
 /* Placement of centres scene by scene: does the last program converge, and does the blanket end where it
  * says; then NLopt with Ipopt's wall time and number of centres, each judged by the blanket that runs again;
- * then what a scene costs. bench_placement SCENE.yaml... [once]   (once: Ipopt alone, for the growth with
- * size) */
+ * then what a scene costs. bench_placement SCENE.yaml... [once] [log]   (once: Ipopt alone, for the growth
+ * with size; log: what each round does, on stderr) */
 #include "planner/placement.h"
 
 #include <stdio.h>
@@ -66,12 +66,19 @@ static void say_end(const char *name, const laid *l, const morph_placement *p, d
     fflush(stdout);
 }
 
+static void say_line(void *user, const char *line) {
+    (void)user;
+    fprintf(stderr, "%s\n", line);
+}
+
+static const morph_control loud = {.log = say_line};
+
 typedef struct tally {
     int scenes, converged, agree, better_than_seeds, better_than_search;
 } tally;
 
 /* Better by more than the blanket's own scatter when it is run on is not asked: the figures stand beside. */
-static void run(const char *path, bool once, tally *t) {
+static void run(const char *path, bool once, const morph_control *control, tally *t) {
     laid l;
     morph_placement ipopt, other;
     if (!lay(path, &l)) {
@@ -79,6 +86,7 @@ static void run(const char *path, bool once, tally *t) {
         return;
     }
     morph_placement_options o = morph_placement_defaults();
+    o.control = control;
     const double reached = place(&l, &o, &ipopt);
     say_end(name_of(path), &l, &ipopt, reached);
     const bool converged = ipopt.solved && ipopt.balance.stable && ipopt.balance.residual < 1e-6 &&
@@ -110,11 +118,14 @@ static void run(const char *path, bool once, tally *t) {
 int main(int argc, char **argv) {
     tally t = {0};
     bool once = false;
-    for (int i = 1; i < argc; i++)
+    const morph_control *control = NULL;
+    for (int i = 1; i < argc; i++) {
         once |= strcmp(argv[i], "once") == 0;
+        if (strcmp(argv[i], "log") == 0) control = &loud;
+    }
     printf("%-20s %7s %7s\n", "scene", "seeds", "Ipopt");
     for (int i = 1; i < argc; i++)
-        if (strcmp(argv[i], "once") != 0) run(argv[i], once, &t);
+        if (strcmp(argv[i], "once") != 0 && strcmp(argv[i], "log") != 0) run(argv[i], once, control, &t);
     printf("of %d: %d converged, of these %d with the blanket within 0.05 spacings; better than seeds %d",
            t.scenes, t.converged, t.agree, t.better_than_seeds);
     if (!once) printf(", than the better search in the same time %d", t.better_than_search);
