@@ -1,5 +1,5 @@
-/* How near to the shortest a plan's duration is: bench_duration FOLDER ... reads plan folders and prints of
- * each, for the path as recorded, rest to rest,
+/* How near to the shortest a plan's duration is: bench_duration [--cells] FOLDER ... reads plan folders and
+ * prints of each, for the path as recorded, rest to rest,
  *   - single: what the slowest link alone needs (closed form; no path at all does better);
  *   - no jerk: the shortest time without jerk limits, rates and accelerations only, by a backward and a
  *     forward pass over an even grid of s. Up to the grid this is the optimum of that problem, and so a bound
@@ -7,6 +7,8 @@
  *   - dense: the shortest time found with all three limits, by a search of its own (below), on ever finer
  *     grids from several starts, as it stands on its nodes and (feasible) stretched by what a grid eight
  * times finer shows;
+ *     with --cells also from what a search over cells of states finds (cells.h; half a minute), to see that
+ * no start has missed a better valley;
  *   - plan: the recorded duration, and its ratio to the best of the feasible ones.
  *
  * The search: nodes s_0 = 0 .. s_n = 1 are fixed, so L', L'' and L''' there are numbers. Unknown are speed v
@@ -18,6 +20,7 @@
  * links that may bind and are added where they are broken. Solved by Ipopt; then nodes are moved to even
  * times of the result, twice as many, and so on.
  */
+#include "cells.h"
 #include "recorded.h"
 #include "without_jerk.h"
 
@@ -26,77 +29,6 @@
 #include "solvers/nlp.h"
 
 /* ---- dense search ---- */
-
-/* A profile: cubic pieces of s between nodes, with the time of each. */
-typedef struct profile {
-    int n;                 /* pieces */
-    double *s, *v, *a, *h; /* n + 1 each; h: n, s */
-    double *j;             /* n */
-} profile;
-
-static bool profile_create(int n, profile *p) {
-    const size_t m = (size_t)n + 1;
-    double *all = morph_alloc(5 * m, sizeof *all);
-    *p = (profile){.n = n};
-    if (!all) return false;
-    p->s = all;
-    p->v = all + m;
-    p->a = all + 2 * m;
-    p->h = all + 3 * m;
-    p->j = all + 4 * m;
-    return true;
-}
-
-static void profile_free(profile *p) {
-    free(p->s);
-    *p = (profile){0};
-}
-
-static double profile_time(const profile *p) {
-    double sum = 0.0;
-    for (int i = 0; i < p->n; i++)
-        sum += p->h[i];
-    return sum;
-}
-
-/* s, v, a, j inside piece i, t after its start. */
-static void profile_at(const profile *p, int i, double t, double out[4]) {
-    const double j = p->j[i];
-    out[0] = p->s[i] + t * (p->v[i] + t * (p->a[i] / 2.0 + t * j / 6.0));
-    out[1] = p->v[i] + t * (p->a[i] + t * j / 2.0);
-    out[2] = p->a[i] + t * j;
-    out[3] = j;
-}
-
-/* The factor by which time must be stretched for all limits to hold on a grid of `per` points a piece. */
-static double stretch(morph_path_table *table, const profile *p, int per) {
-    const morph_structure *st = table->curve->structure;
-    double worst = 0.0;
-    for (int i = 0; i < p->n; i++)
-        for (int k = 0; k <= per; k++) {
-            double s[4];
-            profile_at(p, i, p->h[i] * k / per, s);
-            morph_path_table_exact(table, fmin(1.0, fmax(0.0, s[0])), 3);
-            morph_timing_chain(st->links, table->exact, s, table->by_time);
-            const double *q = table->by_time + st->links;
-            for (int l = 0; l < st->links; l++) {
-                worst = fmax(worst, fabs(q[l]) / st->rate_limit[l]);
-                worst = fmax(worst, sqrt(fabs(q[st->links + l]) / st->acceleration_limit[l]));
-                worst = fmax(worst, cbrt(fabs(q[2 * st->links + l]) / st->jerk_limit[l]));
-            }
-        }
-    return worst;
-}
-
-static void slow_down(profile *p, double f) {
-    for (int i = 0; i <= p->n; i++) {
-        p->v[i] /= f;
-        p->a[i] /= f * f;
-        if (i == p->n) break;
-        p->h[i] *= f;
-        p->j[i] /= f * f * f;
-    }
-}
 
 /* Nodes at even times of a function of time in [0, 1]: s and its first two derivatives by time. */
 typedef void (*time_function)(const void *data, double tau, double s[3]);
@@ -474,7 +406,7 @@ static bool shorten(morph_path_table *table, profile *p, int *iterations) {
 
 /* ---- what is printed ---- */
 
-enum { LEVELS = 3, STARTS = 5, COARSE = 75, FINER = 8 };
+enum { LEVELS = 3, COARSE = 75, FINER = 8 };
 
 typedef struct found {
     double nodes, feasible; /* s: as solved, and stretched to hold every limit between nodes too */
@@ -502,51 +434,77 @@ static bool search(morph_path_table *table, time_function f, const void *data, i
     return ok;
 }
 
-static int run(const char *folder) {
-    static const warp start[STARTS - 1] = {{0.0, 0.0}, {0.6, 0.0}, {-0.6, 0.0}, {0.0, 0.7}};
+/* Searches from one start; the shortest that is feasible, and the shortest on the finest nodes. */
+static void try_start(morph_path_table *table, const char *name, time_function f, const void *data,
+                      int levels, found *best) {
+    found level[LEVELS];
+    const bool ok = search(table, f, data, levels, level);
+    printf("  dense from %s:", name);
+    for (int n = 0; n < levels && ok; n++) {
+        printf(" %d: %.4f (%.4f)", COARSE << n, level[n].nodes, level[n].feasible);
+        best->feasible = fmin(best->feasible, level[n].feasible);
+    }
+    /* Coarse nodes leave much out between them. */
+    if (ok && levels == LEVELS) best->nodes = fmin(best->nodes, level[LEVELS - 1].nodes);
+    printf("%s\n", ok ? "" : " failed");
+    fflush(stdout);
+}
+
+static void try_cells(morph_path_table *table, found *best) {
+    profile p;
+    double time = NAN;
+    const double began = morph_seconds();
+    const bool ok = search_cells(table, &p, &time);
+    printf("  over cells: %.4f, as coarse as they are; took %.1f s\n", time, morph_seconds() - began);
+    if (!ok) return;
+    try_start(table, "the cells' way", again, &p, LEVELS - 1, best);
+    profile_free(&p);
+}
+
+/* All starts to the second level; the plainest, and the plan's own, to the last. */
+static found try_all(morph_path_table *table, const morph_timing *own, bool cells) {
+    static const warp start[] = {{0.0, 0.0}, {0.6, 0.0}, {-0.6, 0.0}, {0.0, 0.7}};
+    static const char *const name[] = {"a smooth profile", "an early one", "a late one", "an uneven one"};
+    found best = {INFINITY, INFINITY};
+    for (int k = 0; k < 4; k++)
+        try_start(table, name[k], warped, &start[k], k == 0 ? LEVELS : LEVELS - 1, &best);
+    if (cells) try_cells(table, &best);
+    try_start(table, "the plan's profile", recorded_profile, own, LEVELS, &best);
+    return best;
+}
+
+static int run(const char *folder, bool cells) {
     recorded r;
     morph_path_table table;
     if (!recorded_read(folder, &r)) return 1;
     double single = 0.0;
     int link = -1;
-    if (morph_path_table_create(r.curve, &table) != MORPH_OK ||
-        morph_timing_single_link(r.curve, &single, &link) != MORPH_OK)
-        return 1;
-    const double began = morph_seconds(), T = r.timing.duration;
-    const double bound[2] = {without_jerk(&table, 2001), without_jerk(&table, 8001)};
-    found level[LEVELS], best = {INFINITY, INFINITY};
-    printf("%s: %d links, plan %.3f s\n", folder, r.structure->links, T);
-    printf("  single link %.4f s; without jerk %.4f s on 2001 points, %.4f s on 8001\n", single, bound[0],
-           bound[1]);
-    for (int k = 0; k < STARTS; k++) {
-        const bool own = k + 1 == STARTS;
-        /* All starts to the second level; the plainest, and the plan's own, to the last. */
-        const int levels = k == 0 || own ? LEVELS : LEVELS - 1;
-        const bool ok = own ? search(&table, recorded_profile, &r.timing, levels, level)
-                            : search(&table, warped, &start[k], levels, level);
-        printf("  dense from %s:", own ? "the plan's profile" : "a smooth profile");
-        for (int n = 0; n < levels && ok; n++) {
-            printf(" %d: %.4f (%.4f)", COARSE << n, level[n].nodes, level[n].feasible);
-            best.feasible = fmin(best.feasible, level[n].feasible);
-        }
-        /* Coarse nodes leave much out between them: only the finest count for this figure. */
-        if (ok && levels == LEVELS) best.nodes = fmin(best.nodes, level[LEVELS - 1].nodes);
-        printf("%s\n", ok ? "" : " failed");
-        fflush(stdout);
+    const bool ok = morph_timing_single_link(r.curve, &single, &link) == MORPH_OK &&
+                    morph_path_table_create(r.curve, &table) == MORPH_OK;
+    if (ok) {
+        const double began = morph_seconds(), T = r.timing.duration;
+        const double bound[2] = {without_jerk(&table, 2001), without_jerk(&table, 8001)};
+        printf("%s: %d links, plan %.3f s\n", folder, r.structure->links, T);
+        printf("  single link %.4f s; without jerk %.4f s on 2001 points, %.4f s on 8001\n", single, bound[0],
+               bound[1]);
+        const found best = try_all(&table, &r.timing, cells);
+        printf(
+            "= %s single %.4f, no jerk %.4f, dense %.4f on nodes, %.4f, plan %.4f: ratio %.4f, to nodes "
+            "%.4f, to single %.4f; %.1f s\n",
+            folder, single, bound[1], best.nodes, best.feasible, T, T / best.feasible, T / best.nodes,
+            T / single, morph_seconds() - began);
+        morph_path_table_free(&table);
     }
-    printf("= %s %.4f %.4f %.4f %.4f %.4f ratio %.4f, to nodes %.4f, to single %.4f; %.1f s\n", folder,
-           single, bound[1], best.nodes, best.feasible, T, T / best.feasible, T / best.nodes, T / single,
-           morph_seconds() - began);
-    morph_path_table_free(&table);
     recorded_free(&r);
-    return 0;
+    return ok ? 0 : 1;
 }
 
 int main(int count, char **folders) {
     morph_blas_threads(1);
+    const bool cells = count > 1 && strcmp(folders[1], "--cells") == 0;
     int failed = 0;
-    if (count < 2) printf("bench_duration FOLDER ...: plan folders\n");
-    for (int k = 1; k < count; k++)
-        failed |= run(folders[k]);
+    if (count < (cells ? 3 : 2)) printf("bench_duration [--cells] FOLDER ...: plan folders\n");
+    for (int k = cells ? 2 : 1; k < count; k++)
+        failed |= run(folders[k], cells);
     return failed;
 }
