@@ -5,10 +5,9 @@
  *     forward pass over an even grid of s. Up to the grid this is the optimum of that problem, and so a bound
  *     from below for the one with jerk; given on two grids;
  *   - dense: the shortest time found with all three limits, by a search of its own (below), on ever finer
- *     grids from several starts, as it stands on its nodes and (feasible) stretched by what a grid eight
- * times finer shows;
- *     with --cells also from what a search over cells of states finds (cells.h; half a minute), to see that
- * no start has missed a better valley;
+ *     grids from several starts: as it stands on its nodes, and, in parentheses, stretched by what a grid
+ *     eight times finer shows, which makes it feasible. With --cells also from what a search over cells of
+ *     states finds (cells.h; half a minute), to see that no start has missed a better valley;
  *   - plan: the recorded duration, and its ratio to the best of the feasible ones.
  *
  * The search: nodes s_0 = 0 .. s_n = 1 are fixed, so L', L'' and L''' there are numbers. Unknown are speed v
@@ -29,6 +28,9 @@
 #include "solvers/nlp.h"
 
 /* ---- dense search ---- */
+
+/* Pieces of the first level and so many levels; points to a piece for the stretch. */
+enum { LEVELS = 3, COARSE = 75, FINER = 8 };
 
 /* Nodes at even times of a function of time in [0, 1]: s and its first two derivatives by time. */
 typedef void (*time_function)(const void *data, double tau, double s[3]);
@@ -336,6 +338,15 @@ static void unknowns(const dense *d, double *x, double *lower, double *upper) {
     }
 }
 
+/* Says so where a derivative is not that of its row. */
+static void check_derivatives(const dense *d, const morph_block *blocks, const double *x) {
+    morph_derivative_check check;
+    /* Rows and unknowns are scaled to order 1: a step of 1e-5 leaves about 1e-9 of error. */
+    if (morph_check_derivatives(blocks, 3, x, 4 * (d->p->n + 1), 1e-5, 1e-6, &check) != MORPH_OK ||
+        !check.passed)
+        fprintf(stderr, "dense search: wrong derivative: %s\n", check.message);
+}
+
 /* One solve with the rows at hand, from x to x. */
 static bool dense_solve(dense *d, const double *lower, const double *upper, double *x, morph_outcome *outcome,
                         int *iterations) {
@@ -356,6 +367,7 @@ static bool dense_solve(dense *d, const double *lower, const double *upper, doub
         {"motion", equalities, n, NULL, zero, zero, d, motion_value, motion_walk, NULL},
         {"limit", d->rows, n, NULL, low, high, d, limits_value, limits_walk, NULL}};
     ok = ok && morph_nlp_create(n, x, lower, upper, blocks, 3, message, sizeof message, &nlp) == MORPH_OK;
+    if (ok && d->p->n == COARSE) check_derivatives(d, blocks, x);
     morph_nlp_options o = morph_nlp_defaults();
     o.tolerance = 1e-6;
     o.violation_tolerance = 1e-6;
@@ -405,8 +417,6 @@ static bool shorten(morph_path_table *table, profile *p, int *iterations) {
 }
 
 /* ---- what is printed ---- */
-
-enum { LEVELS = 3, COARSE = 75, FINER = 8 };
 
 typedef struct found {
     double nodes, feasible; /* s: as solved, and stretched to hold every limit between nodes too */

@@ -64,7 +64,7 @@ int main(int count, char **folders) {
     }
     morph_blas_threads(1);
     printf("I = T^5 integral of sum of jerk^2 dt; of it without scale, I / sum of squared total changes\n");
-    printf("%-28s %9s %9s %11s %11s %7s %10s %10s %7s\n", "plan", "T plan", "T blanket", "I plan, m2",
+    printf("%-28s %9s %9s %11s %11s %8s %10s %10s %8s\n", "plan", "T plan", "T blanket", "I plan, m2",
            "I bl., m2", "ratio", "free plan", "free bl.", "ratio");
     for (int k = 1; k + 1 < count; k += 2) {
         smoothness plan, blanket;
@@ -73,7 +73,7 @@ int main(int count, char **folders) {
             continue;
         }
         const double a = plan.integral / plan.change, b = blanket.integral / blanket.change;
-        printf("%-28s %9.3f %9.3f %11.4g %11.4g %7.4f %10.4g %10.4g %7.4f\n", folders[k], plan.duration,
+        printf("%-28s %9.3f %9.3f %11.4g %11.4g %8.3g %10.4g %10.4g %8.3g\n", folders[k], plan.duration,
                blanket.duration, plan.integral, blanket.integral, plan.integral / blanket.integral, a, b,
                a / b);
     }
