@@ -199,6 +199,8 @@ static void take_numbers(const morph_summary *from, morph_summary *to) {
     to->redundant = from->redundant;
     to->sigma_min = from->sigma_min;
     to->duration = from->duration;
+    to->single_link_seconds = from->single_link_seconds;
+    to->single_link = from->single_link;
 }
 
 void morph_planner_choose(morph_planner *p, morph_status *status) {

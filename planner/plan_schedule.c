@@ -1,6 +1,7 @@
 /** From the blanket's end to a schedule: refinement, path and timing of a plan. */
 #include "planner/plan_internal.h"
 #include "planner/timing_against.h"
+#include "planner/timing_bound.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -256,6 +257,8 @@ morph_status morph_stage_timing(morph_planner *p) {
     s->iterations_timing = r.iterations;
     s->linear_seconds += r.linear_seconds;
     s->duration = p->timing.duration;
+    if (status == MORPH_OK)
+        status = morph_timing_single_link(p->curve, &s->single_link_seconds, &s->single_link);
     if (status == MORPH_OK && p->scene->duration > 0.0 && r.needed > p->scene->duration)
         status = say_too_short(p, r.needed);
     if (status == MORPH_OK)

@@ -315,6 +315,10 @@ static void put_all(builder *b, cJSON *root, const morph_summary *s) {
     put_number(b, mobility, "redundant", s->redundant);
     put_number(b, mobility, "sigma_min", s->sigma_min);
     put_number(b, root, "duration", s->has_plan ? s->duration : (double)NAN);
+    /* What one link alone would need, rest to rest; null where there is no plan, or no link that moves. */
+    cJSON *bounds = put_object(b, root, "duration_bounds");
+    put_number(b, bounds, "single_link", s->has_plan ? s->single_link_seconds : (double)NAN);
+    put_number(b, bounds, "link", s->has_plan && s->single_link >= 0 ? s->single_link : (double)NAN);
     put_solver(b, root, s);
     if (s->has_guided) put_placement(b, root, s);
     put_seconds(b, root, s);

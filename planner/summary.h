@@ -71,6 +71,9 @@ typedef struct morph_summary {
     int free_motions, redundant;
     double sigma_min; /* at the end of the schedule */
     double duration;
+    /* What one link alone would need, rest to rest (planner/timing_bound.h), and which; -1: none moves. */
+    double single_link_seconds;
+    int single_link;
     int iterations_refine, iterations_path, iterations_timing;
     int unknowns_refine, rows_refine_used, rows_refine_possible;
     int unknowns_path, rows_path_used, rows_path_possible;
