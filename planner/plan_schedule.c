@@ -127,6 +127,7 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
     morph_curve *curve = NULL;
     morph_path_report r;
     /* The other methods' ways are the blanket's, which falls from flat. */
+    o.in_place = p->options->method == MORPH_METHOD_IPOPT;
     o.bent = p->scene->start.pose && p->options->method == MORPH_METHOD_IPOPT;
     const morph_status status = morph_path_plan(
         &p->work.world, p->way, o.bent ? p->work.begin : p->work.start, p->end, &o, &curve, &r);

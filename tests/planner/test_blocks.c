@@ -142,7 +142,7 @@ static void contact(void **state) {
         }
         /* A joint as a point: the other two weights are 0 and the joints repeat. */
         point[0] = (morph_point){{5, 5, 5}, {1.0, 0.0, 0.0}, -1, 0.0};
-        morph_clearance_rows rows = {f->structure, f->sdf, 40, point, 0.01};
+        morph_clearance_rows rows = {f->structure, f->sdf, 40, point, 0.01, 0.0};
         const morph_block block = morph_block_clearance(&rows, NULL, lower, upper);
         expect_right(f, &block);
         const morph_feature feature[2] = {{{0, 1, 5}, false, {0.2, 0.1, 0.3}, {0.0, 0.0, 0.0}, 1.0},
