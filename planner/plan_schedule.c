@@ -40,7 +40,8 @@ static morph_status refine(morph_planner *p, int rounds, morph_refine_report *re
     o.control = morph_planner_control(p);
     if (rounds > 0) o.goal = p->scene->goal;
     o.rounds = rounds;
-    morph_status status = morph_refine(&p->work.world, &o, p->end, report);
+    morph_status status = morph_planner_raise(p);
+    if (status == MORPH_OK) status = morph_refine(&p->work.world, &o, p->end, report);
     status = morph_planner_ended(p, status, MORPH_STAGE_REFINE);
     status = morph_planner_survive(p, report->deaths > 0 && status == MORPH_OK ? MORPH_ERR_BACKEND : status,
                                    MORPH_STAGE_REFINE);
