@@ -31,6 +31,7 @@ typedef struct pather {
     double *metres; /* capacity x coordinates */
     double *lift;   /* capacity: the target above its place, m */
     bool rises;
+    bool end_breaks; /* a limit: no pose inserted before it helps */
     morph_active *active;
     double started;
 } pather;
@@ -169,6 +170,16 @@ typedef struct breach {
     double worst, s;
     morph_limit limit;
 } breach;
+
+/* Whether the end itself breaks a limit, where the target stands then. */
+static morph_status examine_end(pather *p) {
+    morph_violation v;
+    stand_target(p, p->lift[p->count - 1]);
+    const morph_status status =
+        morph_pose_examine(p->world, pose(p, p->count - 1), NULL, NULL, NULL, NULL, &v);
+    p->end_breaks = status == MORPH_OK && morph_violation_worst(&v, morph_pose_tolerance, NULL) > 1.0;
+    return status;
+}
 
 /* Examines the curve between poses: the worst breach of every interval, and the worst violation of all. */
 static morph_status examine_curve(pather *p, const morph_curve *curve, breach *breaches) {
@@ -357,6 +368,7 @@ static morph_status run(pather *p, morph_curve **curve) {
     if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
     if (!p->options->refine && p->options->smooth) status = smooth_poses(p, p->options->smoothness);
     if (status == MORPH_OK) set_parameters(p);
+    if (status == MORPH_OK) status = examine_end(p);
     double before = INFINITY;
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {
         breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
@@ -373,7 +385,8 @@ static morph_status run(pather *p, morph_curve **curve) {
         before = worst;
         bool changed = false;
         p->report->feasible = status == MORPH_OK && worst <= 1.0;
-        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !out_of_time(p))
+        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !p->end_breaks &&
+            !out_of_time(p))
             status = mend(p, *curve, breaches, &changed);
         free(breaches);
         if (!changed) break;

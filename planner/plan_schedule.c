@@ -199,7 +199,8 @@ morph_status morph_stage_path(morph_planner *p) {
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
         status = morph_planner_survive(p, status, MORPH_STAGE_PATH);
-        if (p->curve && least <= 1.0) break;
+        /* No way leads inside its limits to an end that is not. */
+        if (p->curve && (least <= 1.0 || !p->refined.feasible)) break;
         cut = cut || p->stopped || p->lost || morph_seconds() > p->deadline;
         if (!before && p->stopped) {
             morph_planner_limit(p, MORPH_STAGE_PATH); /* the same way again, in the time that a stop leaves */
