@@ -27,8 +27,8 @@ static morph_status lift_by(const morph_planner *p, riser *r, double step, bool 
     morph_violation v;
     memcpy(r->x, r->good, bytes);
     r->world.lift = fmin(0.0, r->lift + step);
-    const morph_status status = morph_project(&r->world, &inset, 4, morph_planner_control(p), r->active, r->x,
-                                              &v, &r->effort);
+    const morph_status status =
+        morph_project(&r->world, &inset, 4, morph_planner_control(p), r->active, r->x, &v, &r->effort);
     *held = status == MORPH_OK && morph_violation_worst(&v, morph_pose_tolerance, NULL) <= 1.0;
     if (*held) {
         memcpy(r->good, r->x, bytes);
