@@ -115,8 +115,8 @@ void morph_scene_destroy(morph_scene *scene); /* NULL allowed */
  * does not support, "not available yet: motion.mode: rise with --method nlopt"; else text is "". The blanket
  * runs every scene that can be read. */
 bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size);
-/* "KEY: VALUE" of the first feature, in the scene file's order, with which no centres of attraction are
- * placed; false, and "", if there is none. */
+/* "KEY: VALUE" of the feature with which no centres of attraction are placed; false, and "", if there is
+ * none. */
 bool morph_scene_unplaceable(const morph_scene *scene, char *text, size_t size);
 
 /* The scene with every default written out, as YAML text (free with free()). mesh_file: what to write as

@@ -13,22 +13,9 @@ static bool beyond_refinement(const morph_scene *scene, char *text, size_t size)
 }
 
 bool morph_scene_unplaceable(const morph_scene *scene, char *text, size_t size) {
-    const morph_structure_def *def = &scene->structure;
     if (size > 0) text[0] = '\0';
-    if (def->layout != MORPH_LAYOUT_POSTS)
-        snprintf(text, size, "structure.layout: %s", morph_layout_names[def->layout]);
-    else if (def->joints != MORPH_JOINTS_BALL)
-        snprintf(text, size, "structure.joints: %s", morph_joint_type_names[def->joints]);
-    else if (def->bracing != MORPH_BRACING_NONE)
-        snprintf(text, size, "structure.bracing: %s", morph_bracing_names[def->bracing]);
-    else if (def->fixed == MORPH_FIXED_LIST)
-        snprintf(text, size, "structure.fixed: a list of nodes");
-    else if (def->fixed != MORPH_FIXED_NONE)
-        snprintf(text, size, "structure.fixed: %s", morph_fixed_names[def->fixed]);
-    else if (scene->motion.mode != MORPH_MODE_DROP)
-        snprintf(text, size, "motion.mode: %s", morph_mode_names[scene->motion.mode]);
-    else
-        return false;
+    if (scene->motion.mode == MORPH_MODE_DROP) return false;
+    snprintf(text, size, "motion.mode: %s", morph_mode_names[scene->motion.mode]);
     return true;
 }
 
