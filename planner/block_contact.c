@@ -30,6 +30,7 @@ static double clearance(const morph_clearance_rows *d, const morph_point *p, con
     const double a = d->structure->spacing;
     double at[3];
     morph_point_at(p, x, at);
+    at[2] -= d->lift;
     for (int k = 0; k < 3; k++)
         at[k] *= a;
     return morph_sdf_eval(d->sdf, at, g, h) / a + p->bias;

@@ -33,33 +33,50 @@ static double post_scale(const morph_structure *s, int post) {
     return 1.0 / (h * h);
 }
 
+/* A post that is held has no row. */
+static bool post_held(const morph_structure *s, int post) {
+    return s->fixed_joints > 0 && s->joint_fixed[s->post[post][0]] && s->joint_fixed[s->post[post][1]];
+}
+
+int morph_post_row_count(const morph_structure *s) {
+    int rows = 0;
+    for (int p = 0; p < s->posts; p++)
+        rows += !post_held(s, p);
+    return rows;
+}
+
 static morph_status posts_value(void *data, const double *x, double *f) {
     const morph_structure *s = ((const morph_post_rows *)data)->structure;
     for (int p = 0; p < s->posts; p++)
-        f[p] = post_scale(s, p) * squared(x, s->post[p]);
+        if (!post_held(s, p)) *f++ = post_scale(s, p) * squared(x, s->post[p]);
     return MORPH_OK;
 }
 
 static morph_status posts_walk(void *data, const double *x, const double *weight, morph_sink *sink) {
     const morph_structure *s = ((const morph_post_rows *)data)->structure;
-    for (int p = 0; p < s->posts; p++) {
-        if (morph_sink_wants_jacobian(sink)) put_squared_gradient(sink, p, x, s->post[p], post_scale(s, p));
+    for (int p = 0, row = 0; p < s->posts; p++) {
+        if (post_held(s, p)) continue;
+        if (morph_sink_wants_jacobian(sink)) put_squared_gradient(sink, row, x, s->post[p], post_scale(s, p));
         if (morph_sink_wants_hessian(sink))
-            put_squared_hessian(sink, s->post[p], weight[p] * post_scale(s, p));
+            put_squared_hessian(sink, s->post[p], weight[row] * post_scale(s, p));
+        row++;
     }
     return MORPH_OK;
 }
 
 static void posts_describe(void *data, int row, char *text, size_t size) {
-    morph_post_name(((const morph_post_rows *)data)->structure, row, text, size);
+    const morph_structure *s = ((const morph_post_rows *)data)->structure;
+    for (int p = 0; p < s->posts; p++)
+        if (!post_held(s, p) && row-- == 0) morph_post_name(s, p, text, size);
 }
 
 morph_block morph_block_posts(morph_post_rows *data, const int *unknown, double *lower, double *upper) {
     const morph_structure *s = data->structure;
-    for (int p = 0; p < s->posts; p++)
-        lower[p] = upper[p] = 1.0;
+    const int rows = morph_post_row_count(s);
+    for (int r = 0; r < rows; r++)
+        lower[r] = upper[r] = 1.0;
     return (morph_block){.name = "post length",
-                         .rows = s->posts,
+                         .rows = rows,
                          .unknowns = 3 * s->joints,
                          .unknown = unknown,
                          .lower = lower,

@@ -13,11 +13,26 @@
 #include "model/structure.h"
 #include "solvers/nlp.h"
 
-/* |p|^2 / h^2 = 1 for every post. rows: posts. */
+/* Rows between joints that are all held are left out everywhere: nothing in them could move. */
+
+/* |p|^2 / h^2 = 1 for every post that is not held. */
 typedef struct morph_post_rows {
     const morph_structure *structure;
 } morph_post_rows;
 morph_block morph_block_posts(morph_post_rows *data, const int *unknown, double *lower, double *upper);
+int morph_post_row_count(const morph_structure *s);
+
+/* det[p_a, p_b, d] / (h_a h_b) = 0 for every panel of two posts p_a, p_b (lengths h) with d from foot to
+ * foot, in spacings: d is about one long, so the row is about the sine of the angle by which the panel is out
+ * of plane. Panels between two posts that are held are left out. */
+typedef struct morph_panel_rows {
+    const morph_structure *structure;
+} morph_panel_rows;
+morph_block morph_block_panels(morph_panel_rows *data, const int *unknown, double *lower, double *upper);
+int morph_panel_row_count(const morph_structure *s);
+/* That sine at x (any unit), signed: of unit vectors along the posts and from foot to foot. And its name. */
+double morph_panel_sine(const morph_structure *s, int panel, const double *x);
+void morph_panel_name(const morph_structure *s, int panel, char *text, size_t size);
 
 /* min <= length <= max of the listed links, as rows |d|^2 / a^2. margin: taken off both limits, in spacings.
  */
@@ -69,6 +84,7 @@ typedef struct morph_clearance_rows {
     int count;
     const morph_point *point;
     double margin;
+    double lift; /* the target stands so far above where sdf has it, spacings */
 } morph_clearance_rows;
 morph_block morph_block_clearance(morph_clearance_rows *data, const int *unknown, double *lower,
                                   double *upper);

@@ -22,9 +22,10 @@ void morph_compare_shared_free(morph_compare_shared *shared) {
 static void tell_violation(const morph_violation *v, const double tolerance[MORPH_LIMITS],
                            morph_compare_row *row) {
     static const char *const units[MORPH_LIMITS] = {
-        [MORPH_LIMIT_POST] = "of its length", [MORPH_LIMIT_LENGTH] = "spacings",
-        [MORPH_LIMIT_ANGLE] = "rad",          [MORPH_LIMIT_CLEARANCE] = "spacings",
-        [MORPH_LIMIT_BASE] = "spacings",      [MORPH_LIMIT_SELF] = "spacings"};
+        [MORPH_LIMIT_POST] = "of its length", [MORPH_LIMIT_PANEL] = "(sine)",
+        [MORPH_LIMIT_LENGTH] = "spacings",    [MORPH_LIMIT_ANGLE] = "rad",
+        [MORPH_LIMIT_CLEARANCE] = "spacings", [MORPH_LIMIT_BASE] = "spacings",
+        [MORPH_LIMIT_SELF] = "spacings"};
     morph_limit which = MORPH_LIMIT_POST;
     morph_violation_worst(v, tolerance, &which);
     snprintf(row->reason, sizeof row->reason, "%s: %s: beyond by %.3g %s", morph_limit_name(which),
@@ -112,13 +113,21 @@ static bool refuse(const morph_compare_shared *sh, morph_compare_row *row) {
     return !morph_scene_supported(sh->scene, "ipopt", row->reason, sizeof row->reason);
 }
 
+static bool refuse_centres(const morph_compare_shared *sh, morph_compare_row *row) {
+    char feature[96];
+    if (refuse(sh, row)) return true;
+    if (!morph_scene_unplaceable(sh->scene, feature, sizeof feature)) return false;
+    snprintf(row->reason, sizeof row->reason, "not available yet: %s with centres that are placed", feature);
+    return true;
+}
+
 /* The blanket under seeds beneath its own cavities. */
 static morph_status run_seeds(morph_compare_shared *sh, morph_compare_row *row) {
     const double *end = sh->end[MORPH_COMPARE_BLANKET];
     morph_attractor seed[1];
     morph_trajectory t = {0};
     int count = 0;
-    if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
+    if (refuse_centres(sh, row) || !end) return MORPH_ERR_INPUT;
     const morph_scene *s = sh->scene;
     const double unit = morph_balance_unit(&s->structure, s->motion.gravity);
     morph_status status = morph_seed_centres(&sh->work, end, unit, 1, seed, &count);
@@ -135,7 +144,7 @@ static morph_status run_nlopt(morph_compare_shared *sh, morph_compare_row *row) 
     static const morph_placement_method methods[2] = {MORPH_PLACE_NLOPT_GRADIENT, MORPH_PLACE_NLOPT_FREE};
     const double *end = sh->end[MORPH_COMPARE_BLANKET];
     double least = INFINITY;
-    if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
+    if (refuse_centres(sh, row) || !end) return MORPH_ERR_INPUT;
     morph_status status = MORPH_OK;
     for (int k = 0; k < 2 && status == MORPH_OK; k++) {
         morph_placement_options o = morph_placement_defaults();
@@ -162,7 +171,7 @@ static morph_status run_nlopt(morph_compare_shared *sh, morph_compare_row *row) 
 /* Kept for the plan, which would place the same centres again. */
 static morph_status run_guided(morph_compare_shared *sh, morph_compare_row *row) {
     const double *end = sh->end[MORPH_COMPARE_BLANKET];
-    if (refuse(sh, row) || !end) return MORPH_ERR_INPUT;
+    if (refuse_centres(sh, row) || !end) return MORPH_ERR_INPUT;
     morph_placement_options o = morph_placement_defaults();
     o.control = sh->control;
     morph_placement *p = calloc(1, sizeof *p);

@@ -16,7 +16,7 @@ typedef struct morph_curve {
     double *pose; /* poses x width: centre (3), direction (3) per post; or 3*joints */
     double *lift; /* poses: how far the target stands above its place, m; NULL: it stands still */
     morph_spline spline;
-    morph_hold *hold; /* links of one length, held on the spline between poses too; NULL: none */
+    morph_hold *hold; /* links of one length and plane panels, held between poses too; NULL: none */
 } morph_curve;
 
 /* Numbers of a pose: 6*posts, or 3*joints without posts. */
@@ -32,7 +32,8 @@ void morph_curve_destroy(morph_curve *curve);
 double morph_curve_lift(const morph_curve *curve, double s);
 
 /* Joints at s and their derivatives 0..order (<= 5, less than MORPH_JET): out is (order + 1) x 3*joints.
- * scratch: (order + 1) x the pose's width. Not from two threads at once on one curve where links are held. */
+ * scratch: (order + 1) x the pose's width. Not from two threads at once on one curve where anything is held.
+ */
 void morph_curve_joints(const morph_curve *curve, double s, int order, double *scratch, double *out);
 
 /* Lengths from joint derivatives as above: out is (order + 1) x links. */

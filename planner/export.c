@@ -74,7 +74,10 @@ static morph_status rebuild(const morph_record *r, rebuilt *b) {
                                      .fixed_count = r->fixed_count,
                                      .fixed = r->fixed,
                                      .post = r->post,
-                                     .post_length = r->post_length};
+                                     .post_length = r->post_length,
+                                     .panels = r->panel ? r->panels : 0,
+                                     .panel = r->panel,
+                                     .spacing = r->spacing};
     b->timing =
         (morph_timing){{r->timing_controls, r->timing_knot}, r->timing_control, r->timing_duration[0]};
     const size_t poses = (size_t)r->poses, width = (size_t)r->pose_width, links = (size_t)r->links;

@@ -1,52 +1,47 @@
-/* With y(s) the spline's pose and e_i(s) the unit directions of the held links in it, the pose becomes
- *   Y(s) = y(s) + sum_i lambda_i(s) (move of link i's ends apart along e_i),
- * with lambda such that |d_i(Y)|^2 = L_i^2 for all held links. All are jets: lambda_0 by Newton's method, and
- * then, since coefficient k of the left side is M lambda_k plus what the lower ones make (M the Jacobian at
- * order 0), each further step makes one more coefficient exact. */
-#include "planner/hold.h"
-
-#include "planner/jet.h"
+/* With y(s) the spline's pose, the pose becomes
+ *   Y(s) = y(s) + sum_i lambda_i(s) move_i(s),
+ * move_i what changes equality i most (hold_rows.c), and lambda such that all of them hold. All are jets:
+ * lambda_0 by Newton's method, and then, since coefficient k of the residuals is M lambda_k plus what the
+ * lower ones make (M the Jacobian at order 0), each further step makes one more coefficient exact. */
+#include "planner/hold_parts.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* A post, or a joint where there are none: its numbers in a pose. */
-typedef struct node {
-    int offset; /* in a pose */
-    int width;  /* 6: centre and direction; 3 */
-    double half;
-    bool fixed;
-    double y[6][MORPH_JET], moved[6][MORPH_JET]; /* as given; corrected */
-} node;
-
-typedef struct held {
-    int end[2];       /* nodes */
-    double side[2];   /* which end of the post: -1 bottom, 1 top */
-    double weight[2]; /* share of the move: 0 where held itself, else they sum to 1 */
-    double length;
-    double along[3][MORPH_JET], d[3][MORPH_JET];
-} held;
-
 struct morph_hold {
     int count, nodes;
     size_t width; /* numbers of a pose */
-    held *link;
-    node *node;
+    morph_hold_row *row;
+    morph_hold_node *node;
     double *lambda, *right; /* count x MORPH_JET */
-    double *matrix;         /* count x count */
+    double *matrix;         /* count x count; factored in place */
+    int *pivot;             /* count */
 };
 
 void morph_hold_destroy(morph_hold *h) {
     if (!h) return;
-    free(h->link);
+    free(h->row);
     free(h->node);
     free(h->lambda);
     free(h->right);
     free(h->matrix);
+    free(h->pivot);
     free(h);
 }
 
-/* The node of a joint, added if it is new. */
+/* The node of a post, or of a joint where there are none, added if it is new. */
+static int node_at(morph_hold *h, const morph_structure *s, int at) {
+    const int width = s->posts > 0 ? 6 : 3;
+    for (int n = 0; n < h->nodes; n++)
+        if (h->node[n].offset == width * at) return n;
+    morph_hold_node *fresh = &h->node[h->nodes];
+    *fresh = (morph_hold_node){.offset = width * at, .width = width};
+    if (s->posts > 0) fresh->half = 0.5 * s->post_length[at];
+    for (int k = 0; k < s->fixed_count; k++)
+        if (s->fixed[k] == at) fresh->fixed = true;
+    return h->nodes++;
+}
+
 static int node_of(morph_hold *h, const morph_structure *s, int joint, double *side) {
     int at = joint;
     *side = 0.0;
@@ -56,181 +51,147 @@ static int node_of(morph_hold *h, const morph_structure *s, int joint, double *s
                 at = p;
                 *side = k ? 1.0 : -1.0;
             }
-    const int width = s->posts > 0 ? 6 : 3;
-    for (int n = 0; n < h->nodes; n++)
-        if (h->node[n].offset == width * at) return n;
-    node *fresh = &h->node[h->nodes];
-    *fresh = (node){.offset = width * at, .width = width};
-    if (s->posts > 0) fresh->half = 0.5 * s->post_length[at];
-    for (int k = 0; k < s->fixed_count; k++)
-        if (s->fixed[k] == at) fresh->fixed = true;
-    return h->nodes++;
+    return node_at(h, s, at);
+}
+
+/* Shares of a row that is set but for them; both ends held: nothing that could move, and no row. */
+static void keep_row(morph_hold *h, morph_hold_row *r, double both) {
+    const bool fixed[2] = {h->node[r->end[0]].fixed, h->node[r->end[1]].fixed};
+    if (fixed[0] && fixed[1]) return;
+    for (int e = 0; e < 2; e++)
+        r->weight[e] = fixed[e] ? 0.0 : fixed[1 - e] ? 1.0 : both;
+    h->count++;
 }
 
 static void add_link(morph_hold *h, const morph_structure *s, int l) {
-    held *k = &h->link[h->count];
-    bool fixed[2];
-    *k = (held){.length = s->length_limit[l][0]};
-    for (int e = 0; e < 2; e++) {
-        k->end[e] = node_of(h, s, s->link[l][e], &k->side[e]);
-        fixed[e] = h->node[k->end[e]].fixed;
-    }
-    if (fixed[0] && fixed[1]) return; /* nothing that could move */
+    morph_hold_row *r = &h->row[h->count];
+    *r = (morph_hold_row){.length = s->length_limit[l][0]};
     for (int e = 0; e < 2; e++)
-        k->weight[e] = fixed[e] ? 0.0 : fixed[1 - e] ? 1.0 : 0.5;
-    h->count++;
+        r->end[e] = node_of(h, s, s->link[l][e], &r->side[e]);
+    keep_row(h, r, 0.5);
+}
+
+static void add_panel(morph_hold *h, const morph_structure *s, int q) {
+    morph_hold_row *r = &h->row[h->count];
+    *r = (morph_hold_row){.panel = true, .length = s->spacing};
+    for (int e = 0; e < 2; e++)
+        r->end[e] = node_at(h, s, s->panel[q][e]);
+    keep_row(h, r, 1.0);
 }
 
 morph_status morph_hold_create(const morph_structure *s, morph_hold **out) {
     *out = NULL;
-    size_t n = 0;
+    size_t links = 0;
     for (int l = 0; l < s->links && s->length_limit; l++)
-        n += s->length_limit[l][0] == s->length_limit[l][1];
-    if (n == 0 || n > MORPH_HOLD_MOST) return MORPH_OK;
+        links += s->length_limit[l][0] == s->length_limit[l][1];
+    if (links > MORPH_HOLD_MOST) links = 0;
+    const size_t n = links + (size_t)s->panels;
+    if (n == 0) return MORPH_OK;
     morph_hold *h = calloc(1, sizeof *h);
     if (!h) return MORPH_ERR_NOMEM;
-    h->link = morph_alloc(n, sizeof *h->link);
+    h->row = morph_alloc(n, sizeof *h->row);
     h->node = morph_alloc(2 * n, sizeof *h->node);
     h->lambda = morph_alloc(n, MORPH_JET * sizeof(double));
     h->right = morph_alloc(n, MORPH_JET * sizeof(double));
     h->matrix = morph_alloc(n, n * sizeof(double));
-    if (!h->link || !h->node || !h->lambda || !h->right || !h->matrix) {
+    h->pivot = morph_alloc(n, sizeof *h->pivot);
+    if (!h->row || !h->node || !h->lambda || !h->right || !h->matrix || !h->pivot) {
         morph_hold_destroy(h);
         return MORPH_ERR_NOMEM;
     }
     h->width = s->posts > 0 ? 6 * (size_t)s->posts : 3 * (size_t)s->joints;
-    for (int l = 0; l < s->links; l++)
+    for (int l = 0; l < s->links && links > 0; l++)
         if (s->length_limit[l][0] == s->length_limit[l][1]) add_link(h, s, l);
+    for (int q = 0; q < s->panels; q++)
+        add_panel(h, s, q);
     *out = h;
     return MORPH_OK;
-}
-
-/* Joint at one side of a node, from its jets. */
-static void joint_jet(const node *n, const double (*y)[MORPH_JET], double side, int order,
-                      double x[3][MORPH_JET]) {
-    double square[MORPH_JET], norm[MORPH_JET], q[MORPH_JET];
-    memcpy(x, y, 3 * sizeof *x);
-    if (n->width == 3) return;
-    morph_jet_dot(y + 3, y + 3, order, square);
-    morph_jet_sqrt(square, order, norm);
-    for (int c = 0; c < 3; c++) {
-        morph_jet_divide(y[3 + c], norm, order, q);
-        for (int k = 0; k <= order; k++)
-            x[c][k] += side * n->half * q[k];
-    }
-}
-
-/* The link's vector from its first end to its second. */
-static void link_jet(const morph_hold *h, const held *l, bool moved, int order, double d[3][MORPH_JET]) {
-    double x[2][3][MORPH_JET];
-    for (int e = 0; e < 2; e++) {
-        const node *n = &h->node[l->end[e]];
-        joint_jet(n, (const double(*)[MORPH_JET])(moved ? n->moved : n->y), l->side[e], order, x[e]);
-    }
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k <= order; k++)
-            d[c][k] = x[1][c][k] - x[0][c][k];
-}
-
-/* What end e of a link adds to its node by lambda = 1 along a: half of the move by the post's centre, half by
- * its turn, so that the joint moves by its share and the post's other joint, to first order, not at all. */
-static void share(const held *l, int e, const node *n, double *centre, double *direction) {
-    const double move = (e ? 1.0 : -1.0) * l->weight[e];
-    *centre = n->width == 3 ? move : 0.5 * move;
-    *direction = n->width == 3 ? 0.0 : 0.5 * move * l->side[e] / n->half;
 }
 
 static void move_nodes(morph_hold *h, int order) {
     for (int n = 0; n < h->nodes; n++)
         memcpy(h->node[n].moved, h->node[n].y, sizeof h->node[n].y);
     for (int i = 0; i < h->count; i++) {
-        const held *l = &h->link[i];
+        const morph_hold_row *r = &h->row[i];
         const double *lambda = &h->lambda[i * MORPH_JET];
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k <= order; k++) {
-                double product = 0.0;
-                for (int j = 0; j <= k; j++)
-                    product += lambda[j] * l->along[c][k - j];
-                for (int e = 0; e < 2; e++) {
-                    node *n = &h->node[l->end[e]];
-                    double centre, direction;
-                    share(l, e, n, &centre, &direction);
-                    n->moved[c][k] += centre * product;
-                    if (n->width == 6) n->moved[3 + c][k] += direction * product;
-                }
-            }
-    }
-}
-
-/* Change of link i's vector, order 0, with lambda_j. */
-static void slope(const morph_hold *h, const held *i, const held *j, double out[3]) {
-    out[0] = out[1] = out[2] = 0.0;
-    for (int e = 0; e < 2; e++)
-        for (int f = 0; f < 2; f++) {
-            if (i->end[e] != j->end[f]) continue;
-            const node *n = &h->node[i->end[e]];
-            double centre, direction, q[3] = {0.0, 0.0, 0.0}, norm = 1.0, along = 0.0;
-            share(j, f, n, &centre, &direction);
-            if (n->width == 6) {
-                norm = sqrt(n->moved[3][0] * n->moved[3][0] + n->moved[4][0] * n->moved[4][0] +
-                            n->moved[5][0] * n->moved[5][0]);
-                for (int c = 0; c < 3; c++)
-                    q[c] = n->moved[3 + c][0] / norm;
-            }
-            for (int c = 0; c < 3; c++)
-                along += q[c] * j->along[c][0];
-            for (int c = 0; c < 3; c++)
-                out[c] +=
-                    (e ? 1.0 : -1.0) * (centre * j->along[c][0] + i->side[e] * n->half * direction / norm *
-                                                                      (j->along[c][0] - along * q[c]));
+        for (int e = 0; e < 2; e++) {
+            morph_hold_node *n = &h->node[r->end[e]];
+            for (int c = 0; c < n->width; c++)
+                for (int k = 0; k <= order; k++)
+                    for (int j = 0; j <= k; j++)
+                        n->moved[c][k] += lambda[j] * r->move[e][c][k - j];
         }
+    }
 }
 
 /* Residuals of all orders into right; the largest of order 0, relative. */
 static double residuals(morph_hold *h, int order) {
     double worst = 0.0;
-    for (int i = 0; i < h->count; i++) {
-        held *l = &h->link[i];
-        double *r = &h->right[i * MORPH_JET];
-        link_jet(h, l, true, order, l->d);
-        morph_jet_dot((const double(*)[MORPH_JET])l->d, (const double(*)[MORPH_JET])l->d, order, r);
-        r[0] -= l->length * l->length;
-        worst = fmax(worst, fabs(r[0]) / (l->length * l->length));
-    }
+    for (int i = 0; i < h->count; i++)
+        worst =
+            fmax(worst, morph_hold_residual(&h->row[i], h->node, order, &h->right[(size_t)i * MORPH_JET]));
     return worst;
 }
 
-/* Solves matrix X = right by elimination with row pivoting, all orders at once; false where it is singular.
- */
-static bool solve(morph_hold *h, int order) {
+/* matrix = the residuals' change with each lambda, order 0. */
+static void assemble(morph_hold *h) {
+    for (int i = 0; i < h->count; i++)
+        morph_hold_set_slope(&h->row[i], h->node);
+    for (int i = 0; i < h->count; i++)
+        for (int j = 0; j < h->count; j++) {
+            const morph_hold_row *a = &h->row[i], *b = &h->row[j];
+            double sum = 0.0;
+            for (int e = 0; e < 2; e++)
+                for (int f = 0; f < 2; f++)
+                    for (int c = 0; a->end[e] == b->end[f] && c < h->node[a->end[e]].width; c++)
+                        sum += a->slope[e][c] * b->move[f][c][0];
+            h->matrix[(size_t)i * (size_t)h->count + (size_t)j] = sum;
+        }
+}
+
+static void swap_rows(double *a, double *b, int n) {
+    for (int k = 0; k < n; k++) {
+        const double keep = a[k];
+        a[k] = b[k];
+        b[k] = keep;
+    }
+}
+
+/* LU with row pivoting in place; false where it is singular. Most entries are zero (rows share few nodes),
+ * and those rows are passed over. */
+static bool factor(morph_hold *h) {
     const int n = h->count;
-    double *a = h->matrix, *b = h->right;
+    double *a = h->matrix;
     for (int c = 0; c < n; c++) {
         int best = c;
         for (int r = c + 1; r < n; r++)
             if (fabs(a[r * n + c]) > fabs(a[best * n + c])) best = r;
-        /* A regular system has pivots of about a length; one this small means links that cannot be moved
+        /* A regular system has pivots of about a length; one this small means equalities that cannot be met
          * apart from each other. */
-        if (!(fabs(a[best * n + c]) > 1e-6 * h->link[c].length)) return false;
-        for (int k = 0; k < n && best != c; k++) {
-            const double keep = a[c * n + k];
-            a[c * n + k] = a[best * n + k];
-            a[best * n + k] = keep;
-        }
-        for (int k = 0; k <= order && best != c; k++) {
-            const double keep = b[c * MORPH_JET + k];
-            b[c * MORPH_JET + k] = b[best * MORPH_JET + k];
-            b[best * MORPH_JET + k] = keep;
-        }
+        if (!(fabs(a[best * n + c]) > 1e-6 * h->row[c].length)) return false;
+        h->pivot[c] = best;
+        if (best != c) swap_rows(&a[c * n], &a[best * n], n);
         for (int r = c + 1; r < n; r++) {
-            const double f = a[r * n + c] / a[c * n + c];
-            if (f == 0.0) continue;
-            for (int k = c; k < n; k++)
+            if (a[r * n + c] == 0.0) continue;
+            const double f = a[r * n + c] /= a[c * n + c];
+            for (int k = c + 1; k < n; k++)
                 a[r * n + k] -= f * a[c * n + k];
-            for (int k = 0; k <= order; k++)
-                b[r * MORPH_JET + k] -= f * b[c * MORPH_JET + k];
         }
     }
+    return true;
+}
+
+/* right becomes the solution, all orders at once. */
+static void solve(morph_hold *h, int order) {
+    const int n = h->count;
+    const double *a = h->matrix;
+    double *b = h->right;
+    for (int c = 0; c < n; c++)
+        if (h->pivot[c] != c) swap_rows(&b[c * MORPH_JET], &b[h->pivot[c] * MORPH_JET], order + 1);
+    for (int r = 0; r < n; r++)
+        for (int c = 0; c < r; c++)
+            for (int k = 0; a[r * n + c] != 0.0 && k <= order; k++)
+                b[r * MORPH_JET + k] -= a[r * n + c] * b[c * MORPH_JET + k];
     for (int r = n - 1; r >= 0; r--)
         for (int k = 0; k <= order; k++) {
             double sum = b[r * MORPH_JET + k];
@@ -238,43 +199,17 @@ static bool solve(morph_hold *h, int order) {
                 sum -= a[r * n + c] * b[c * MORPH_JET + k];
             b[r * MORPH_JET + k] = sum / a[r * n + r];
         }
-    return true;
 }
 
-static bool step(morph_hold *h, int order) {
-    for (int i = 0; i < h->count; i++)
-        for (int j = 0; j < h->count; j++) {
-            double move[3];
-            slope(h, &h->link[i], &h->link[j], move);
-            double sum = 0.0;
-            for (int c = 0; c < 3; c++)
-                sum += 2.0 * h->link[i].d[c][0] * move[c];
-            h->matrix[i * h->count + j] = sum;
-        }
-    if (!solve(h, order)) return false;
-    for (int i = 0; i < h->count; i++)
-        for (int k = 0; k <= order; k++)
-            h->lambda[i * MORPH_JET + k] -= h->right[i * MORPH_JET + k];
-    return true;
-}
-
-static void load(morph_hold *h, int order, const double *pose, size_t width) {
+static void load(morph_hold *h, int order, const double *pose) {
     for (int m = 0; m < h->nodes; m++) {
-        node *n = &h->node[m];
+        morph_hold_node *n = &h->node[m];
         for (int i = 0; i < n->width; i++)
             for (int k = 0; k <= order; k++)
-                n->y[i][k] = pose[(size_t)k * width + (size_t)(n->offset + i)] / morph_factorial[k];
+                n->y[i][k] = pose[(size_t)k * h->width + (size_t)(n->offset + i)] / morph_factorial[k];
     }
-    for (int i = 0; i < h->count; i++) {
-        held *l = &h->link[i];
-        double square[MORPH_JET], norm[MORPH_JET];
-        link_jet(h, l, false, order, l->along);
-        morph_jet_dot((const double(*)[MORPH_JET])l->along, (const double(*)[MORPH_JET])l->along, order,
-                      square);
-        morph_jet_sqrt(square, order, norm);
-        for (int c = 0; c < 3; c++)
-            morph_jet_divide(l->along[c], norm, order, l->along[c]);
-    }
+    for (int i = 0; i < h->count; i++)
+        morph_hold_set_move(&h->row[i], h->node, order);
     memset(h->lambda, 0, (size_t)h->count * MORPH_JET * sizeof *h->lambda);
 }
 
@@ -285,22 +220,29 @@ static const double settled = 1e-14;
 
 void morph_hold_apply(morph_hold *h, int order, double *pose) {
     if (!h || h->count == 0) return;
-    const size_t width = h->width;
-    load(h, order, pose, width);
+    load(h, order, pose);
     int since = -1;
     double worst = INFINITY;
     for (int n = 0; n < STEPS + order + 1; n++) {
         move_nodes(h, order);
         worst = residuals(h, order);
-        if (since < 0 && worst <= settled) since = n;
         if (since >= 0 && n > since + order) break;
-        if (!step(h, order)) return;
+        /* Once order 0 has settled the matrix stays. */
+        if (since < 0) {
+            assemble(h);
+            if (!factor(h)) return;
+        }
+        if (since < 0 && worst <= settled) since = n;
+        solve(h, order);
+        for (int i = 0; i < h->count; i++)
+            for (int k = 0; k <= order; k++)
+                h->lambda[i * MORPH_JET + k] -= h->right[i * MORPH_JET + k];
     }
     if (!(worst <= 1e-12)) return;
     for (int m = 0; m < h->nodes; m++) {
-        const node *n = &h->node[m];
+        const morph_hold_node *n = &h->node[m];
         for (int i = 0; i < n->width; i++)
             for (int k = 0; k <= order; k++)
-                pose[(size_t)k * width + (size_t)(n->offset + i)] = n->moved[i][k] * morph_factorial[k];
+                pose[(size_t)k * h->width + (size_t)(n->offset + i)] = n->moved[i][k] * morph_factorial[k];
     }
 }

@@ -188,7 +188,7 @@ morph_status morph_limits_against(const morph_structure *s, const morph_nlp *nlp
     }
     /* A joint on the base plane; other lower bounds are the round's reach. */
     for (int i = 2; i < n && result->lower_multiplier; i += 3)
-        if (result->x[i] - base[i] < 1e-4)
+        if (result->x[i] - base[i] < 1e-4 && !(s->fixed_joints > 0 && s->joint_fixed[i / 3]))
             add(&w, (candidate){.kind = AGAINST_BASE,
                                 .strength = GIVE_LENGTH * result->lower_multiplier[i],
                                 .block = -1,

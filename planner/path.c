@@ -20,7 +20,8 @@ morph_path_options morph_path_defaults(void) {
 }
 
 typedef struct pather {
-    const morph_world *world;
+    const morph_world *world; /* here */
+    morph_world here;         /* the world with the target where it stands at the pose in hand */
     const morph_path_options *options;
     morph_path_report *report;
     int coordinates, count, capacity;
@@ -30,6 +31,7 @@ typedef struct pather {
     double *metres; /* capacity x coordinates */
     double *lift;   /* capacity: the target above its place, m */
     bool rises;
+    bool end_breaks; /* a limit: no pose inserted before it helps */
     morph_active *active;
     double started;
 } pather;
@@ -64,6 +66,7 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
     const int n = p->coordinates;
     const double a = p->world->structure->spacing;
     const double *last = &guide->x[(size_t)(guide->frames - 1) * (size_t)n];
+    const double short_of = guide->lift && p->options->in_place ? -guide->lift[guide->frames - 1] : 0.0;
     p->count = p->options->intervals + 1;
     int at_frame = -1;
 
@@ -81,7 +84,7 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
             pose(p, k)[i] = at / a;
         }
         p->inset[k] = 1.0;
-        p->lift[k] = guide->lift ? guide->lift[at_frame] : 0.0;
+        p->lift[k] = guide->lift ? guide->lift[at_frame] + bend * short_of : 0.0;
         p->rises = p->rises || p->lift[k] != 0.0;
     }
 }
@@ -96,6 +99,7 @@ static void set_stations(pather *p, const morph_trajectory *guide, const double 
     for (int m = 1; m < stations; m++) {
         for (size_t i = 0; i < width; i++)
             pose(p, p->count)[i] = p->options->station[(size_t)m * width + i] / a;
+        p->lift[p->count] = p->lift[p->count - 1];
         p->inset[p->count++] = 1.0;
     }
 }
@@ -114,6 +118,10 @@ static morph_inset inset_at(const pather *p, double s, double factor) {
  * killed the next by then too. */
 enum { MOST_DEATHS = 3 };
 
+static void stand_target(pather *p, double lift) {
+    p->here.lift = lift;
+}
+
 /* Moves pose k the least from where it stands so that it holds its limits with its inset. A solver that dies
  * leaves the pose as it was: the curve's examination decides whether that matters. */
 static morph_status solve_pose(pather *p, int k) {
@@ -123,6 +131,7 @@ static morph_status solve_pose(pather *p, int k) {
     double *before = morph_alloc(width, sizeof *before);
     if (!before) return MORPH_ERR_NOMEM;
     memcpy(before, pose(p, k), width * sizeof *before);
+    stand_target(p, p->lift[k]);
     morph_status status = morph_project(p->world, &inset, 5, p->options->control, p->active, pose(p, k), &v,
                                         &p->report->effort);
     if ((status == MORPH_ERR_BACKEND || status == MORPH_ERR_NOMEM) && ++p->report->deaths <= MOST_DEATHS) {
@@ -162,6 +171,16 @@ typedef struct breach {
     morph_limit limit;
 } breach;
 
+/* Whether the end itself breaks a limit, where the target stands then. */
+static morph_status examine_end(pather *p) {
+    morph_violation v;
+    stand_target(p, p->lift[p->count - 1]);
+    const morph_status status =
+        morph_pose_examine(p->world, pose(p, p->count - 1), NULL, NULL, NULL, NULL, &v);
+    p->end_breaks = status == MORPH_OK && morph_violation_worst(&v, morph_pose_tolerance, NULL) > 1.0;
+    return status;
+}
+
 /* Examines the curve between poses: the worst breach of every interval, and the worst violation of all. */
 static morph_status examine_curve(pather *p, const morph_curve *curve, breach *breaches) {
     const morph_structure *st = p->world->structure;
@@ -176,6 +195,7 @@ static morph_status examine_curve(pather *p, const morph_curve *curve, breach *b
         for (int f = 0; f <= p->options->fine && status == MORPH_OK; f++) {
             const double s = p->s[k] + (p->s[k + 1] - p->s[k]) * f / p->options->fine;
             morph_violation v;
+            stand_target(p, morph_curve_lift(curve, s));
             morph_curve_joints(curve, s, 0, scratch, x);
             for (int i = 0; i < p->coordinates; i++)
                 x[i] /= st->spacing;
@@ -208,7 +228,9 @@ static bool make_room(pather *p) {
     if (inset) p->inset = inset;
     double *metres = realloc(p->metres, rows * width * sizeof *metres);
     if (metres) p->metres = metres;
-    if (!s || !x || !inset || !metres) return false;
+    double *lift = realloc(p->lift, rows * sizeof *lift);
+    if (lift) p->lift = lift;
+    if (!s || !x || !inset || !metres || !lift) return false;
     p->capacity = next;
     return true;
 }
@@ -219,9 +241,11 @@ static morph_status insert_pose(pather *p, const morph_curve *curve, int k, doub
     const size_t width = (size_t)p->coordinates, after = (size_t)(p->count - k - 1);
     memmove(&p->s[k + 2], &p->s[k + 1], after * sizeof *p->s);
     memmove(&p->inset[k + 2], &p->inset[k + 1], after * sizeof *p->inset);
+    memmove(&p->lift[k + 2], &p->lift[k + 1], after * sizeof *p->lift);
     memmove(pose(p, k + 2), pose(p, k + 1), after * width * sizeof *p->x);
     p->count++;
     p->s[k + 1] = s;
+    p->lift[k + 1] = morph_curve_lift(curve, s);
     p->inset[k + 1] = 0.5 * (p->inset[k] + p->inset[k + 2]);
     double *scratch = morph_alloc((size_t)morph_pose_width(p->world->structure), sizeof(double));
     if (!scratch) return MORPH_ERR_NOMEM;
@@ -257,6 +281,16 @@ static bool out_of_time(const pather *p) {
            (p->options->seconds > 0.0 && morph_seconds() - p->started > p->options->seconds);
 }
 
+/* Held joints stand where they start: exactly, not as the sums and solves that moved them leave them. */
+static void hold_fixed(pather *p) {
+    const morph_structure *st = p->world->structure;
+    for (int k = 1; k < p->count; k++)
+        for (int f = 0; f < st->fixed_joints; f++) {
+            const size_t at = 3 * (size_t)st->fixed_joint[f];
+            memcpy(&pose(p, k)[at], &pose(p, 0)[at], 3 * sizeof *p->x);
+        }
+}
+
 /* Smooths the poses between the ends: min sum |y - x|^2 + weight sum |second differences|^2, coordinate by
  * coordinate one banded system; poses keep their places in the row, so even progress stays even. */
 static morph_status smooth_poses(pather *p, double weight) {
@@ -287,6 +321,7 @@ static morph_status smooth_poses(pather *p, double weight) {
         }
     if (status == MORPH_OK) status = morph_dense_solve(matrix, n, right, width);
     if (status == MORPH_OK) memcpy(pose(p, 1), right, (size_t)n * (size_t)width * sizeof *right);
+    hold_fixed(p);
     free(matrix);
     free(right);
     return status;
@@ -301,6 +336,7 @@ static morph_status unfold_poses(pather *p) {
         const double *from = pose(p, k + 1), *start = pose(p, 0);
         for (int i = 0; i < p->coordinates; i++)
             pose(p, k)[i] = from[i] + (start[i] - from[i]) / (k + 1);
+        p->lift[k] = p->lift[k + 1] + (p->lift[0] - p->lift[k + 1]) / (k + 1);
         p->s[k] = (double)k / (p->count - 1);
         status = solve_pose(p, k);
         morph_progress(p->options->control, "path", 0.7 * (1.0 - (double)k / p->count));
@@ -327,10 +363,12 @@ static morph_status settle_poses(pather *p) {
 
 static morph_status run(pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
+    hold_fixed(p);
     set_parameters(p);
     if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
     if (!p->options->refine && p->options->smooth) status = smooth_poses(p, p->options->smoothness);
     if (status == MORPH_OK) set_parameters(p);
+    if (status == MORPH_OK) status = examine_end(p);
     double before = INFINITY;
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {
         breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
@@ -347,7 +385,8 @@ static morph_status run(pather *p, morph_curve **curve) {
         before = worst;
         bool changed = false;
         p->report->feasible = status == MORPH_OK && worst <= 1.0;
-        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !out_of_time(p))
+        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !p->end_breaks &&
+            !out_of_time(p))
             status = mend(p, *curve, breaches, &changed);
         free(breaches);
         if (!changed) break;
@@ -360,12 +399,13 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
                              morph_path_report *report) {
     *out = NULL;
     *report = (morph_path_report){.rows_possible = morph_possible_rows(world->structure)};
-    pather p = {.world = world,
+    pather p = {.here = *world,
                 .options = options,
                 .report = report,
                 .coordinates = 3 * world->structure->joints,
                 .capacity = options->intervals + options->stations + 8,
                 .started = morph_seconds()};
+    p.world = &p.here;
     const size_t rows = (size_t)p.capacity, width = (size_t)p.coordinates;
     p.s = morph_alloc(rows, sizeof(double));
     p.x = morph_alloc(rows * width, sizeof(double));

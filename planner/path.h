@@ -22,6 +22,7 @@ typedef struct morph_path_options {
     bool refine;           /* false: the guide's poses as they are, nothing solved (the pure blanket) */
     int fine;              /* points examined per interval */
     bool bent;             /* the start is a shape of its own, not where the guide begins */
+    bool in_place;         /* at the end the target stands in its place, wherever the guide left it */
     bool smooth;           /* with refine false: smoothed, which takes no solve either */
     const morph_control *control;
 } morph_path_options;
@@ -37,8 +38,10 @@ typedef struct morph_path_report {
     double where[MORPH_LIMITS]; /* parameter of each */
 } morph_path_report;
 
-/* guide: the nominal trajectory; start, end: 3*joints, metres. end must be rigid in its posts. The curve is
- * returned also where it is not feasible; report says where it breaks. */
+/* guide: the nominal trajectory; start, end: 3*joints, metres. end must be rigid in its posts and plane in
+ * its panels. The curve is returned also where it is not feasible; report says where it breaks. Joints that
+ * are held stay where start has them; where the guide's target is lifted the curve's is, and poses are held
+ * clear of it where it then stands. */
 morph_status morph_path_plan(const morph_world *world, const morph_trajectory *guide, const double *start,
                              const double *end, const morph_path_options *options, morph_curve **out,
                              morph_path_report *report);

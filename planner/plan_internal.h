@@ -89,6 +89,10 @@ double morph_planner_write_seconds(const morph_record *record);
 morph_status morph_planner_trim(const morph_planner *p, const morph_curve *curve, morph_curve **out,
                                 double *kept);
 
+/** Moves the end on under the target's rise where the way's last frame has it short of its place: as far as
+ *  limits are held. Fails as morph_project does; the end is then the last pose that held. */
+morph_status morph_planner_raise(morph_planner *p);
+
 /** Adds the seconds since `since` to a stage of the summary. */
 void morph_planner_time(morph_planner *p, morph_stage stage, double since);
 

@@ -71,6 +71,11 @@ morph_status morph_stage_placement(morph_planner *p) {
     if (p->options->method == MORPH_METHOD_BLANKET || p->stopped ||
         p->scene->attractors != MORPH_ATTRACT_AUTO)
         return MORPH_OK;
+    char beyond[160];
+    if (morph_scene_unplaceable(p->scene, beyond, sizeof beyond)) {
+        morph_log(morph_planner_control(p), "placement: left out: %s", beyond);
+        return MORPH_OK;
+    }
     const double since = morph_seconds();
     morph_placement own = {0};
     const morph_placement *placed = p->options->placement;

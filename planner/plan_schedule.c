@@ -42,7 +42,8 @@ static morph_status refine(morph_planner *p, int rounds, morph_refine_report *re
     o.control = morph_planner_control(p);
     if (rounds > 0) o.goal = p->scene->goal;
     o.rounds = rounds;
-    morph_status status = morph_refine(&p->work.world, &o, p->end, report);
+    morph_status status = morph_planner_raise(p);
+    if (status == MORPH_OK) status = morph_refine(&p->work.world, &o, p->end, report);
     status = morph_planner_ended(p, status, MORPH_STAGE_REFINE);
     status = morph_planner_survive(p, report->deaths > 0 && status == MORPH_OK ? MORPH_ERR_BACKEND : status,
                                    MORPH_STAGE_REFINE);
@@ -129,6 +130,7 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
     morph_curve *curve = NULL;
     morph_path_report r;
     /* The other methods' ways are the blanket's, which falls from flat. */
+    o.in_place = p->options->method == MORPH_METHOD_IPOPT;
     o.bent = p->scene->start.pose && p->options->method == MORPH_METHOD_IPOPT;
     const morph_status status = morph_path_plan(
         &p->work.world, p->way, o.bent ? p->work.begin : p->work.start, p->end, &o, &curve, &r);
@@ -199,7 +201,8 @@ morph_status morph_stage_path(morph_planner *p) {
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
         status = morph_planner_survive(p, status, MORPH_STAGE_PATH);
-        if (p->curve && least <= 1.0) break;
+        /* No way leads inside its limits to an end that is not. */
+        if (p->curve && (least <= 1.0 || !p->refined.feasible)) break;
         cut = cut || p->stopped || p->lost || morph_seconds() > p->deadline;
         if (!before && p->stopped) {
             morph_planner_limit(p, MORPH_STAGE_PATH); /* the same way again, in the time that a stop leaves */

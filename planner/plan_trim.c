@@ -15,6 +15,7 @@ static const double least_piece = 0.01;
 static morph_status holds_until(const morph_world *world, const morph_curve *curve, double *scratch,
                                 double *x, double *until) {
     const morph_structure *st = world->structure;
+    morph_world here = *world;
     morph_status status = MORPH_OK;
     *until = 0.0;
     for (int k = 0; k <= POINTS && status == MORPH_OK; k++) {
@@ -23,7 +24,8 @@ static morph_status holds_until(const morph_world *world, const morph_curve *cur
         morph_curve_joints(curve, s, 0, scratch, x);
         for (int i = 0; i < 3 * st->joints; i++)
             x[i] /= st->spacing;
-        status = morph_pose_examine(world, x, NULL, NULL, NULL, NULL, &v);
+        here.lift = morph_curve_lift(curve, s);
+        status = morph_pose_examine(&here, x, NULL, NULL, NULL, NULL, &v);
         if (status != MORPH_OK || morph_violation_worst(&v, morph_pose_tolerance, NULL) > 1.0) break;
         *until = s;
     }
@@ -39,8 +41,12 @@ static morph_status cut(const morph_curve *curve, double end, double *scratch, m
         s[k] = (double)k / (POSES - 1);
         morph_curve_joints(curve, end * s[k], 0, scratch, &x[(size_t)k * width]);
     }
-    const morph_status status = morph_curve_create(curve->structure, s, x, POSES, out);
+    morph_status status = morph_curve_create(curve->structure, s, x, POSES, out);
     free(x);
+    if (status == MORPH_OK && curve->lift && !((*out)->lift = morph_alloc(POSES, sizeof(double))))
+        status = MORPH_ERR_NOMEM;
+    for (int k = 0; k < POSES && status == MORPH_OK && curve->lift; k++)
+        (*out)->lift[k] = morph_curve_lift(curve, end * s[k]);
     return status;
 }
 

@@ -3,11 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Posts: the check allows 1e-6. Length, angle, base, self: the check allows rounding only, and the insets pay
- * for the solver's convergence (1e-8 in scaled rows). Clearance: the check allows 1e-3 spacing. */
+/* Posts and panels: the check allows 1e-6. Length, angle, base, self: the check allows rounding only, and the
+ * insets pay for the solver's convergence (1e-8 in scaled rows). Clearance: the check allows 1e-3 spacing. */
 const double morph_pose_tolerance[MORPH_LIMITS] = {
-    [MORPH_LIMIT_POST] = 5e-7,      [MORPH_LIMIT_LENGTH] = 1e-9, [MORPH_LIMIT_ANGLE] = 1e-9,
-    [MORPH_LIMIT_CLEARANCE] = 5e-4, [MORPH_LIMIT_BASE] = 1e-9,   [MORPH_LIMIT_SELF] = 1e-9};
+    [MORPH_LIMIT_POST] = 5e-7,  [MORPH_LIMIT_PANEL] = 5e-7,     [MORPH_LIMIT_LENGTH] = 1e-9,
+    [MORPH_LIMIT_ANGLE] = 1e-9, [MORPH_LIMIT_CLEARANCE] = 5e-4, [MORPH_LIMIT_BASE] = 1e-9,
+    [MORPH_LIMIT_SELF] = 1e-9};
 
 void morph_effort_add(morph_effort *e, const morph_nlp_result *result) {
     e->solves++;
@@ -43,10 +44,7 @@ static morph_status solve(projector *p, double *x) {
     /* A projection that would have to go further than this is not one; the bounds keep a failing solve from
      * wandering off. */
     const double reach = 1.0;
-    for (int i = 0; i < p->n; i++) {
-        p->lower[i] = fmax(p->base[i], p->reference[i] - reach);
-        p->upper[i] = fmax(p->base[i], p->reference[i]) + reach;
-    }
+    morph_pose_box(p->world, p->base, p->reference, reach, p->lower, p->upper);
     morph_status status = morph_nlp_create(p->n, x, p->lower, p->upper, blocks, count, NULL, 0, &nlp);
     if (status != MORPH_OK) return status;
     morph_nlp_result result = {0};
@@ -85,7 +83,7 @@ morph_status morph_project(const morph_world *world, const morph_inset *inset, i
     p.upper = morph_alloc((size_t)p.n, sizeof(double));
     morph_status status = p.reference && p.base && p.lower && p.upper ? MORPH_OK : MORPH_ERR_NOMEM;
     if (status == MORPH_OK) {
-        memcpy(p.reference, x, (size_t)p.n * sizeof *x);
+        memcpy(p.reference, x, (size_t)p.n * sizeof *x); /* held joints stay where it has them */
         morph_pose_bounds(world, inset->clearance, p.base);
         morph_active_clear(active, world->structure);
         status = morph_pose_examine(world, x, inset, &near, active, NULL, violation);

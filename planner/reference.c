@@ -8,7 +8,7 @@ enum { PASSES = 3 };
 
 /* The check's tolerances in the scaled terms of a violation (its own for the base is in metres). */
 void morph_reference_tolerance(const morph_structure *s, double tolerance[MORPH_LIMITS]) {
-    tolerance[MORPH_LIMIT_POST] = 1e-6;
+    tolerance[MORPH_LIMIT_POST] = tolerance[MORPH_LIMIT_PANEL] = 1e-6;
     tolerance[MORPH_LIMIT_LENGTH] = tolerance[MORPH_LIMIT_ANGLE] = tolerance[MORPH_LIMIT_SELF] = 1e-9;
     tolerance[MORPH_LIMIT_CLEARANCE] = 1e-3;
     tolerance[MORPH_LIMIT_BASE] = 1e-6 / s->spacing;
@@ -48,14 +48,14 @@ typedef struct solver {
 
 static morph_status create(solver *s) {
     const size_t n = 3 * (size_t)s->w->structure->joints;
-    if (!s->w->sdf || s->w->structure->posts == 0) return MORPH_ERR_INPUT;
+    if (!s->w->sdf) return MORPH_ERR_INPUT;
     s->trial = morph_alloc(n, sizeof(double));
     s->scaled = morph_alloc(n, sizeof(double));
     if (!s->trial || !s->scaled) return MORPH_ERR_NOMEM;
     morph_reference_tolerance(s->w->structure, s->accepted);
     morph_status status = morph_reference_structure(s->w->structure, &s->wide);
     if (status == MORPH_OK) status = morph_cavity_create(s->wide, s->w->exact, s->w->world.base, &s->cavity);
-    s->world = (morph_world){s->wide, s->w->exact, s->w->sdf, s->cavity, s->w->world.base};
+    s->world = (morph_world){s->wide, s->w->exact, s->w->sdf, s->cavity, s->w->world.base, 0.0};
     return status;
 }
 
@@ -138,9 +138,14 @@ static morph_status solve_from(solver *s, int start) {
     return status;
 }
 
-/* A flat sheet just above the target's highest exposed point: inside every limit, and above all of it. */
+/* A flat sheet just above the target's highest exposed point: inside every limit, and above all of it. Held
+ * nodes leave it no choice of where: then as it starts. */
 static void lay_flat(const solver *s) {
     const morph_structure *st = s->wide;
+    if (st->fixed_joints > 0) {
+        memcpy(s->trial, s->w->start, 3 * (size_t)st->joints * sizeof *s->trial);
+        return;
+    }
     double top = isnan(s->world.base) ? -INFINITY : s->world.base;
     for (int k = 0; k < s->cavity->exposed; k++)
         top = fmax(top, s->cavity->expose[k].point[2]);

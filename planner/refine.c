@@ -171,10 +171,7 @@ static morph_status solve_round(refiner *r, int round, morph_nlp_result *result)
     }
     char message[256] = "";
     morph_nlp *nlp = NULL;
-    for (int i = 0; i < n; i++) {
-        r->lower[i] = fmax(r->base[i], r->anchor[i] - r->reach);
-        r->upper[i] = fmax(r->lower[i], r->anchor[i]) + r->reach;
-    }
+    morph_pose_box(r->world, r->base, r->anchor, r->reach, r->lower, r->upper);
     for (int i = n; i < n + slacks; i++) {
         r->lower[i] = 0.0;
         r->upper[i] = INFINITY;

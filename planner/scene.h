@@ -111,10 +111,13 @@ morph_status morph_scene_read(const char *path, morph_fault_sink fault, morph_fa
                               morph_scene **out);
 void morph_scene_destroy(morph_scene *scene); /* NULL allowed */
 
-/* Can `method` ("ipopt", "blanket") plan this scene? If not, text names the first feature that it does not
- * support, "not available yet: motion.mode: rise with --method ipopt"; else text is "". The blanket runs
- * every scene that can be read. */
+/* Can `method` ("ipopt", "nlopt", "blanket") plan this scene? If not, text names the first feature that it
+ * does not support, "not available yet: motion.mode: rise with --method nlopt"; else text is "". The blanket
+ * runs every scene that can be read. */
 bool morph_scene_supported(const morph_scene *scene, const char *method, char *text, size_t size);
+/* "KEY: VALUE" of the feature with which no centres of attraction are placed; false, and "", if there is
+ * none. */
+bool morph_scene_unplaceable(const morph_scene *scene, char *text, size_t size);
 
 /* The scene with every default written out, as YAML text (free with free()). mesh_file: what to write as
  * target.file (the copy beside it, relative to where the text will stand), NULL for shapes without one or to

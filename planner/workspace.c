@@ -75,7 +75,7 @@ morph_status morph_workspace_create(const morph_scene *scene, const morph_contro
         morph_workspace_free(w);
         return status;
     }
-    w->world = (morph_world){s, w->exact, w->sdf, w->cavity, scene->base};
+    w->world = (morph_world){s, w->exact, w->sdf, w->cavity, scene->base, 0.0};
     return MORPH_OK;
 }
 

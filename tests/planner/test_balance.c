@@ -68,7 +68,7 @@ static int setup(void **state) {
     const morph_balance_load load = {9.81, 0.0};
     bool ok = morph_distance_create(&mesh, true, &f->exact) == MORPH_OK &&
               morph_sdf_create(f->exact, lo, hi, 0.1 / 8.0, NULL, &f->sdf) == MORPH_OK;
-    f->world = (morph_world){f->structure, f->exact, f->sdf, NULL, 0.0};
+    f->world = (morph_world){f->structure, f->exact, f->sdf, NULL, 0.0, 0.0};
     ok = ok && morph_balance_create(&f->world, &load, CENTRES, &f->balance) == MORPH_OK;
     f->balance->epsilon = 0.01;
     f->balance->hold = 0.3;

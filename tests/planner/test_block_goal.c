@@ -57,7 +57,7 @@ static int setup(void **state) {
     const bool ok = f->x && morph_distance_create(&mesh, true, &f->exact) == MORPH_OK &&
                     morph_sdf_create(f->exact, lo, hi, 0.1 / 8.0, NULL, &f->sdf) == MORPH_OK &&
                     morph_cavity_create(f->structure, f->exact, 0.0, &f->cavity) == MORPH_OK;
-    f->world = (morph_world){f->structure, f->exact, f->sdf, f->cavity, 0.0};
+    f->world = (morph_world){f->structure, f->exact, f->sdf, f->cavity, 0.0, 0.0};
     morph_mesh_free(&mesh);
     *state = f;
     return ok ? 0 : -1;

@@ -107,6 +107,63 @@ static void members(void **state) {
     }
 }
 
+/* Of a structure of its own kind: rows of panels, and what held nodes leave of posts and panels. */
+static void panels(void **state) {
+    (void)state;
+    const int node[2][2] = {{0, 0}, {1, 0}};
+    morph_structure_def def = morph_structure_defaults(0.1);
+    def.nodes[0] = NX;
+    def.nodes[1] = NY;
+    def.joints = MORPH_JOINTS_UNIVERSAL;
+    for (int held = 0; held < 2; held++) {
+        fixture f = {0};
+        double lower[64], upper[64], value[64];
+        if (held) {
+            def.fixed = MORPH_FIXED_LIST;
+            def.fixed_nodes = 2;
+            def.fixed_node = node;
+        }
+        assert_int_equal(morph_structure_create(&def, &f.structure), MORPH_OK);
+        const morph_structure *s = f.structure;
+        f.n = 3 * s->joints;
+        f.x = calloc((size_t)f.n, sizeof(double));
+        assert_non_null(f.x);
+        morph_panel_rows rows = {s};
+        morph_post_rows posts = {s};
+        for (unsigned seed = 1; seed <= 3; seed++) {
+            shake(&f, seed, 0.6);
+            const morph_block block = morph_block_panels(&rows, NULL, lower, upper),
+                              post = morph_block_posts(&posts, NULL, lower + 32, upper + 32);
+            assert_int_equal(block.rows, s->panels - held);
+            assert_int_equal(post.rows, s->posts - 2 * held);
+            expect_right(&f, &block);
+            expect_right(&f, &post);
+            block.value(block.data, f.x, value);
+            for (int q = held; q < s->panels; q++) {
+                /* The row is the sine times the lengths over those of the flat start. The held panel is the
+                 * first. */
+                const int *a = s->post[s->panel[q][0]], *b = s->post[s->panel[q][1]];
+                const double sizes = morph_dist(&f.x[3 * a[0]], &f.x[3 * a[1]]) *
+                                     morph_dist(&f.x[3 * b[0]], &f.x[3 * b[1]]) *
+                                     morph_dist(&f.x[3 * a[0]], &f.x[3 * b[0]]) / 0.25;
+                assert_true(fabs(value[q - held] - sizes * morph_panel_sine(s, q, f.x)) < 1e-12);
+                char name[96], wanted[96];
+                block.describe(block.data, q - held, name, sizeof name);
+                morph_panel_name(s, q, wanted, sizeof wanted);
+                assert_string_equal(name, wanted);
+            }
+            char name[96];
+            post.describe(post.data, 0, name, sizeof name);
+            assert_string_equal(name, held ? "post (2,0)" : "post (0,0)");
+        }
+        shake(&f, 1, 0.0);
+        for (int q = 0; q < s->panels; q++)
+            assert_true(fabs(morph_panel_sine(s, q, f.x)) < 1e-15);
+        free(f.x);
+        morph_structure_destroy(f.structure);
+    }
+}
+
 static void angles(void **state) {
     fixture *f = *state;
     double lower[400], upper[400];
@@ -142,9 +199,18 @@ static void contact(void **state) {
         }
         /* A joint as a point: the other two weights are 0 and the joints repeat. */
         point[0] = (morph_point){{5, 5, 5}, {1.0, 0.0, 0.0}, -1, 0.0};
-        morph_clearance_rows rows = {f->structure, f->sdf, 40, point, 0.01};
+        morph_clearance_rows rows = {f->structure, f->sdf, 40, point, 0.01, 0.1 * (seed - 1.0)};
         const morph_block block = morph_block_clearance(&rows, NULL, lower, upper);
         expect_right(f, &block);
+        /* A target that stands higher is a pose that hangs lower. */
+        double raised[40], lowered[40];
+        block.value(block.data, f->x, raised);
+        for (int i = 2; i < f->n; i += 3)
+            f->x[i] -= rows.lift;
+        rows.lift = 0.0;
+        block.value(block.data, f->x, lowered);
+        for (int k = 0; k < 40; k++)
+            assert_true(fabs(raised[k] - lowered[k]) < 1e-12);
         const morph_feature feature[2] = {{{0, 1, 5}, false, {0.2, 0.1, 0.3}, {0.0, 0.0, 0.0}, 1.0},
                                           {{6, 7, 7}, true, {-0.2, 0.1, 0.4}, {0.3, -0.9, 0.1}, -1.0}};
         morph_feature_rows features = {f->structure, 2, feature, 0.0};
@@ -188,6 +254,7 @@ static void cavity_terms(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(members, setup, teardown),
+        cmocka_unit_test(panels),
         cmocka_unit_test_setup_teardown(angles, setup, teardown),
         cmocka_unit_test_setup_teardown(contact, setup, teardown),
         cmocka_unit_test_setup_teardown(cavity_terms, setup, teardown),

@@ -111,10 +111,7 @@ static void test_offset(void **state) {
 }
 
 /* Each derivative of all joints against central differences of the one before, away from knots. */
-static void test_derivatives(void **state) {
-    (void)state;
-    morph_structure *st = make(false, true);
-    morph_curve *c = draw(st);
+static void check_derivatives(morph_structure *st, morph_curve *c) {
     const size_t width = 3 * (size_t)st->joints;
     double *scratch = room(MORPH_JET * (size_t)morph_pose_width(st)), *x = room(3 * MORPH_JET * width);
     const double h = 1e-5;
@@ -140,6 +137,106 @@ static void test_derivatives(void **state) {
     free(x);
     morph_curve_destroy(c);
     morph_structure_destroy(st);
+}
+
+static void test_derivatives(void **state) {
+    (void)state;
+    morph_structure *st = make(false, true);
+    check_derivatives(st, draw(st));
+}
+
+/* Posts that lean by up to 0.05, each its own way: panels out of plane by as much. With held = true also the
+ * links above, of one length. */
+static morph_curve *draw_panels(bool plane, bool held, const int (*fixed)[2], morph_structure **out) {
+    morph_structure_def def = morph_structure_defaults(0.1);
+    def.nodes[0] = def.nodes[1] = 3;
+    if (plane) def.joints = MORPH_JOINTS_UNIVERSAL;
+    if (held) {
+        def.stuck_links = 2;
+        def.stuck_link = stuck;
+    }
+    if (fixed) {
+        def.fixed = MORPH_FIXED_LIST;
+        def.fixed_nodes = 1;
+        def.fixed_node = fixed;
+    }
+    assert_int_equal(morph_structure_create(&def, out), MORPH_OK);
+    const morph_structure *st = *out;
+    const size_t width = 3 * (size_t)st->joints;
+    double s[POSES], *x = room(POSES * width);
+    for (int k = 0; k < POSES; k++) {
+        s[k] = k / (POSES - 1.0);
+        for (int p = 0; p < st->posts; p++) {
+            const double lean[3] = {0.05 * s[k] * sin(2.0 * p + s[k]), 0.05 * s[k] * cos(3.0 * p - s[k]),
+                                    1.0};
+            for (size_t c = 0; c < 3; c++) {
+                const double foot = st->start[3 * p + (int)c] + 0.004 * s[k] * sin(p + 2.0 * (double)c);
+                x[(size_t)k * width + 3 * (size_t)p + c] = foot;
+                x[(size_t)k * width + 3 * (size_t)(st->posts + p) + c] =
+                    foot + 0.05 * lean[c] / morph_norm(lean);
+            }
+        }
+    }
+    morph_curve *c;
+    assert_int_equal(morph_curve_create(st, s, x, POSES, &c), MORPH_OK);
+    free(x);
+    return c;
+}
+
+/* As the check has it: unit vectors along the posts and from foot to foot. */
+static double sine(const morph_structure *st, int q, const double *x) {
+    const int *a = st->post[st->panel[q][0]], *b = st->post[st->panel[q][1]];
+    double u[3], v[3], d[3], c[3];
+    morph_sub(&x[3 * a[1]], &x[3 * a[0]], u);
+    morph_sub(&x[3 * b[1]], &x[3 * b[0]], v);
+    morph_sub(&x[3 * b[0]], &x[3 * a[0]], d);
+    morph_cross(u, v, c);
+    return morph_dot(c, d) / (morph_norm(u) * morph_norm(v) * morph_norm(d));
+}
+
+static void check_panels(bool held, const int (*fixed)[2]) {
+    morph_structure *st, *loose;
+    morph_curve *c = draw_panels(true, held, fixed, &st), *other = draw_panels(false, false, NULL, &loose);
+    const size_t width = 3 * (size_t)st->joints;
+    double *scratch = room((size_t)morph_pose_width(st)), *x = room(width), *y = room(width), astray = 0.0,
+           moved = 0.0;
+    for (int k = 0; k <= 150; k++) {
+        morph_curve_joints(c, k / 150.0, 0, scratch, x);
+        morph_curve_joints(other, k / 150.0, 0, scratch, y);
+        for (int q = 0; q < st->panels; q++) {
+            assert_near(sine(st, q, x), 0.0, 1e-14);
+            astray = fmax(astray, fabs(sine(st, q, y)));
+        }
+        for (int p = 0; p < st->posts; p++)
+            assert_near(morph_dist(&x[3 * st->post[p][0]], &x[3 * st->post[p][1]]), st->post_length[p],
+                        1e-15);
+        for (int i = 0; held && i < 2; i++)
+            assert_near(morph_dist(&x[3 * st->link[stuck[i]][0]], &x[3 * st->link[stuck[i]][1]]), 0.1, 1e-14);
+        for (size_t i = 0; i < width; i++) {
+            moved = fmax(moved, fabs(x[i] - y[i]));
+            if (st->joint_fixed[i / 3]) assert_near(x[i], y[i], 0.0);
+        }
+    }
+    assert_true(astray > 1e-2); /* without it they are not plane */
+    assert_true(moved < 0.01);  /* about what the posts lean, not more */
+    free(scratch);
+    free(x);
+    free(y);
+    morph_curve_destroy(c);
+    morph_curve_destroy(other);
+    morph_structure_destroy(st);
+    morph_structure_destroy(loose);
+}
+
+static void test_panels(void **state) {
+    (void)state;
+    const int node[1][2] = {{1, 0}};
+    check_panels(false, NULL);
+    check_panels(true, NULL);
+    check_panels(false, node);
+    morph_structure *st;
+    morph_curve *c = draw_panels(true, true, NULL, &st);
+    check_derivatives(st, c);
 }
 
 /* A post that is held stays where it is; its neighbour makes the whole move. */
@@ -233,6 +330,7 @@ static void test_structure(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_posts),       cmocka_unit_test(test_offset),
                                        cmocka_unit_test(test_derivatives), cmocka_unit_test(test_fixed),
-                                       cmocka_unit_test(test_refusals),    cmocka_unit_test(test_structure)};
+                                       cmocka_unit_test(test_panels),      cmocka_unit_test(test_refusals),
+                                       cmocka_unit_test(test_structure)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

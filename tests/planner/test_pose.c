@@ -311,7 +311,7 @@ static void test_counts_and_bounds(void **state) {
     for (int i = 0; i < f.n; i++)
         assert_true(f.metres[i] == -INFINITY);
 
-    morph_violation v = {.amount = {1e-7, -1.0, 2e-9, 1e-4, -INFINITY, 0.0}};
+    morph_violation v = {.amount = {1e-7, 2e-7, -1.0, 2e-9, 1e-4, -INFINITY, 0.0}};
     morph_limit which = MORPH_LIMIT_POST;
     assert_near(morph_violation_worst(&v, morph_pose_tolerance, &which), 2.0, 1e-9);
     assert_int_equal(which, MORPH_LIMIT_ANGLE);

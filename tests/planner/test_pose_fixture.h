@@ -135,7 +135,7 @@ static inline void fixture_make_def(fixture *f, const morph_structure_def *def, 
     assert_int_equal(morph_sdf_create(f->exact, lo, hi, STEP / 10.0, NULL, &f->sdf), MORPH_OK);
     assert_int_equal(morph_cavity_create(f->s, f->exact, base, &f->cavity), MORPH_OK);
     assert_int_equal(morph_active_create(f->s, &f->active), MORPH_OK);
-    f->world = (morph_world){f->s, f->exact, f->sdf, f->cavity, base};
+    f->world = (morph_world){f->s, f->exact, f->sdf, f->cavity, base, 0.0};
 }
 
 static inline void fixture_make(fixture *f, int nx, int ny, const solid *b, double base) {

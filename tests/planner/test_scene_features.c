@@ -300,32 +300,37 @@ static void test_room(void **state) {
 
 static void test_supported(void **state) {
     (void)state;
+    /* NULL: that is planned, centres are placed. */
     static const struct {
-        const char *structure, *sections, *feature; /* NULL: ipopt plans it */
+        const char *structure, *sections, *unplanned, *unplaced;
     } cases[] = {
-        {"", "}", NULL},
-        {"", "}\nattractors: [{at: [0, 0, 0], strength: 1}]", NULL},
-        {", support: frame", "}", NULL},
-        {", fixed: []", "}", NULL},
-        {", layout: offset", "}", "structure.layout: offset"},
-        {", joints: universal", "}", "structure.joints: universal"},
-        {", bracing: web", "}", "structure.bracing: web"},
-        {", bracing: full, fixed: border", "}", "structure.bracing: full"},
-        {", fixed: corners", "}", "structure.fixed: corners"},
-        {", fixed: [[1, 1]]", "}", "structure.fixed: a list of nodes"},
-        {"", "}\nmotion: {mode: rise}", "motion.mode: rise"},
-        {"", ", deformable: {young: 1e4, density: 300}}", "target.deformable"},
+        {"", "}", NULL, NULL},
+        {"", "}\nattractors: [{at: [0, 0, 0], strength: 1}]", NULL, NULL},
+        {", support: frame", "}", NULL, NULL},
+        {", fixed: []", "}", NULL, NULL},
+        {", layout: offset", "}", NULL, NULL},
+        {", joints: universal", "}", NULL, NULL},
+        {", bracing: web", "}", NULL, NULL},
+        {", bracing: full, fixed: border", "}", NULL, NULL},
+        {", fixed: corners", "}", NULL, NULL},
+        {", fixed: [[1, 1]]", "}", NULL, NULL},
+        {"", "}\nmotion: {mode: rise}", NULL, "motion.mode: rise"},
+        {"", ", deformable: {young: 1e4, density: 300}}", "target.deformable", NULL},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         morph_scene *scene = scene_with(cases[k].structure, cases[k].sections);
+        static const char *const methods[] = {"blanket", "ipopt", "nlopt"};
         char text[160] = "x", expected[160];
-        assert_true(morph_scene_supported(scene, "blanket", text, sizeof text));
-        assert_string_equal(text, "");
-        const bool good = morph_scene_supported(scene, "ipopt", text, sizeof text);
-        assert_int_equal(good, cases[k].feature == NULL);
-        snprintf(expected, sizeof expected, "not available yet: %s with --method ipopt",
-                 cases[k].feature ? cases[k].feature : "");
-        assert_string_equal(text, good ? "" : expected);
+        for (int m = 0; m < 3; m++) {
+            const char *feature = m == 0 ? NULL : cases[k].unplanned;
+            if (m == 2 && !feature) feature = cases[k].unplaced;
+            assert_int_equal(morph_scene_supported(scene, methods[m], text, sizeof text), feature == NULL);
+            snprintf(expected, sizeof expected, "not available yet: %s with --method %s",
+                     feature ? feature : "", methods[m]);
+            assert_string_equal(text, feature ? expected : "");
+        }
+        assert_int_equal(morph_scene_unplaceable(scene, text, sizeof text), cases[k].unplaced != NULL);
+        assert_string_equal(text, cases[k].unplaced ? cases[k].unplaced : "");
         morph_scene_destroy(scene);
     }
 }
