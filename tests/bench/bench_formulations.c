@@ -4,9 +4,13 @@
  *   A   the product: pose by pose (joints as unknowns), then timing of the fixed path
  *   A1  the same unknowns, all poses in one problem (smoothness and distance to the first poses), then timing
  *   B   as A1 with the lengths as unknowns too, tied to the joints by quadratic rows, then timing
- *   C   path and timing in one problem: joints and durations, least time plus smoothness; motion limits by
- *       finite differences
+ *   C   path and timing in one problem: joints and a duration per interval, least time plus smoothness;
+ *       motion limits by finite differences
+ *   C1  as C with one duration for all intervals: the poses are samples at even times
  *   D   as C with the lengths as unknowns too
+ *   D1  as C1 with the lengths as unknowns too
+ * T disc: the end time as C and D have it; T own: the same stretched until a smooth curve through their poses
+ * at their times holds its limits; T: the product's timing of the path. SECONDS: of the process, for each.
  * Each block that is new here is first checked against central differences. What comes out is examined by the
  * same code for all: between poses on a fine grid from raw positions, and by the checker on a schedule. */
 #include "formulation_whole.h"
@@ -52,12 +56,16 @@ static bool check_block(const morph_block *block, const double *x, int unknowns)
 }
 
 /* On a small sheet of crooked poses and uneven durations. */
-static bool check_layout(const morph_structure *s, bool lengths) {
-    form_layout l = {.structure = s, .intervals = 4, .lengths = lengths, .durations = true, .unit = 0.7};
+static bool check_layout(const morph_structure *s, bool lengths, bool even) {
+    form_layout l = {
+        .structure = s, .intervals = 4, .lengths = lengths, .durations = true, .even = even, .unit = 0.7};
     const int n = form_unknowns(&l), rows = form_motion_rows(&l), width = form_width(&l);
     double *x = morph_alloc((size_t)n, sizeof *x), *bounds = morph_alloc(2 * (size_t)rows, sizeof *bounds);
-    int *map = morph_alloc((size_t)(width + s->links), sizeof *map);
-    bool good = x && bounds && map;
+    int *map = morph_alloc((size_t)(width + s->links), sizeof *map),
+        *list = morph_alloc((size_t)rows, sizeof *list);
+    bool good = x && bounds && map && list;
+    for (int row = 0; row < rows && good; row++)
+        list[row] = row;
     unsigned long long state = 7;
     for (int u = 0; u < n && good; u++) {
         const double flat = u < form_length_at(&l, 0) ? s->start[u % width] / s->spacing : 1.0;
@@ -66,8 +74,9 @@ static bool check_layout(const morph_structure *s, bool lengths) {
     if (good) {
         form_smooth smooth = {&l, 30.0};
         form_time time = {&l, 1.0};
-        const morph_block block[] = {form_block_motion(&l, bounds, bounds + rows), form_block_smooth(&smooth),
-                                     form_block_time(&time)};
+        form_motion motion = {&l, rows, list};
+        const morph_block block[] = {form_block_motion(&motion, bounds, bounds + rows),
+                                     form_block_smooth(&smooth), form_block_time(&time)};
         for (int b = 0; b < 3; b++)
             good = check_block(&block[b], x, n) && good;
         memset(bounds, 0, (size_t)rows * sizeof *bounds);
@@ -79,6 +88,7 @@ static bool check_layout(const morph_structure *s, bool lengths) {
     free(x);
     free(bounds);
     free(map);
+    free(list);
     return good;
 }
 
@@ -88,10 +98,13 @@ static bool check_derivatives(void) {
     def.nodes[1] = 2;
     morph_structure *s = NULL;
     if (morph_structure_create(&def, &s) != MORPH_OK) return false;
-    printf("derivatives of the new blocks, lengths from joints:\n");
-    bool good = check_layout(s, false);
-    printf("lengths as unknowns:\n");
-    good = check_layout(s, true) && good;
+    bool good = true;
+    printf("derivatives of the new blocks:\n");
+    for (int k = 0; k < 4; k++) {
+        printf(" lengths %s, %s\n", k % 2 ? "as unknowns" : "from joints",
+               k / 2 ? "one duration" : "a duration per interval");
+        good = check_layout(s, k % 2, k / 2) && good;
+    }
     morph_structure_destroy(s);
     return good;
 }
@@ -206,7 +219,7 @@ static morph_status own_time(const form_whole *w, const morph_curve *curve, outc
     double tau[FORM_POSES] = {0.0};
     const int last = w->layout.intervals;
     for (int k = 0; k < last; k++)
-        tau[k + 1] = tau[k] + w->duration[k] * w->layout.unit;
+        tau[k + 1] = tau[k] + w->duration[w->layout.even ? 0 : k] * w->layout.unit;
     o->planned = tau[last];
     for (int k = 0; k <= last; k++)
         tau[k] /= o->planned;
@@ -224,12 +237,18 @@ static morph_status own_time(const form_whole *w, const morph_curve *curve, outc
     return status;
 }
 
-static morph_status whole(const morph_planner *p, bool lengths, bool durations, double seconds, outcome *o) {
+typedef struct formulation {
+    const char *name;
+    bool lengths, durations, even;
+} formulation;
+
+static morph_status whole(const morph_planner *p, const formulation *f, double seconds, outcome *o) {
     const morph_path_options d = morph_path_defaults();
-    const form_layout layout = {.intervals = d.intervals, .lengths = lengths, .durations = durations};
-    /* The product's smoothness. Time over its start's counts TIME_WEIGHT: at the solution the time's part of
-     * the objective is then some ten times that of the smoothness. */
-    const form_weights weights = {durations ? 0.0 : 1.0, d.smoothness, durations ? 100.0 : 0.0, seconds};
+    const form_layout layout = {
+        .intervals = d.intervals, .lengths = f->lengths, .durations = f->durations, .even = f->even};
+    /* The product's smoothness. With durations, time over its start's counts a thousand: some thirty times as
+     * much as the smoothness then comes to. */
+    const form_weights weights = {1.0, d.smoothness, 1000.0, seconds};
     form_whole w;
     morph_curve *curve = NULL;
     const double since = cpu_seconds();
@@ -237,7 +256,7 @@ static morph_status whole(const morph_planner *p, bool lengths, bool durations, 
     if (status == MORPH_OK) status = form_run(&w, &curve);
     o->path_cpu = cpu_seconds() - since;
     o->effort = w.effort;
-    if (status == MORPH_OK && durations) status = own_time(&w, curve, o);
+    if (status == MORPH_OK && f->durations) status = own_time(&w, curve, o);
     if (status == MORPH_OK) status = finish(p, curve, o);
     morph_curve_destroy(curve);
     form_free(&w);
@@ -270,17 +289,20 @@ static void print_outcome(const outcome *o) {
 }
 
 static void compare(const morph_planner *p, double seconds) {
-    static const char *const names[] = {"A", "A1", "B", "C", "D"};
+    static const formulation all[] = {{"A", false, false, false}, {"A1", false, false, false},
+                                      {"B", true, false, false},  {"C", false, true, false},
+                                      {"C1", false, true, true},  {"D", true, true, false},
+                                      {"D1", true, true, true}};
     printf("%-3s %5s %8s %7s %8s %8s %6s %6s %8s %8s  %-10s %9s  %-10s %7s %7s %7s\n", "", "poses",
            "unknowns", "rows", "nnz J", "nnz H", "solves", "iter", "CPU s", "timing", "outcome", "worst",
            "check", "T disc", "T own", "T");
-    for (int k = 0; k < 5; k++) {
-        outcome o = {.name = names[k]};
-        const morph_status status = k == 0 ? product(p, &o) : whole(p, k == 2 || k == 4, k >= 3, seconds, &o);
+    for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
+        outcome o = {.name = all[k].name};
+        const morph_status status = k == 0 ? product(p, &o) : whole(p, &all[k], seconds, &o);
         if (status == MORPH_OK)
             print_outcome(&o);
         else
-            printf("%-3s %s\n", names[k], morph_status_text(status));
+            printf("%-3s %s\n", all[k].name, morph_status_text(status));
     }
 }
 
@@ -326,7 +348,7 @@ static bool run_scene(const char *path, int nodes, double seconds) {
 int main(int argc, char **argv) {
     static const char *const scenes[] = {"examples/scenes/box_4.yaml", "examples/scenes/sphere_4.yaml"};
     int nodes = 0, given = 0;
-    double seconds = 120.0;
+    double seconds = 60.0;
     bool good = true;
     morph_blas_threads(1);
     if (!check_derivatives()) return 1;

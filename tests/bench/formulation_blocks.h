@@ -2,19 +2,21 @@
  * durations. For bench_formulations.c only.
  *
  * Unknowns: (intervals + 1) poses of 3*joints coordinates in spacings, then, if lengths are unknowns, as many
- * times all links in spacings, then, if durations are, one per interval in units of `unit` seconds. The first
- * and the last pose are fixed by their bounds. */
+ * times all links in spacings, then, if durations are, one per interval (or one for all) in units of `unit`
+ * seconds. The first and the last pose are fixed by their bounds. */
 #ifndef MORPH_BENCH_FORMULATION_BLOCKS_H
 #define MORPH_BENCH_FORMULATION_BLOCKS_H
 
 #include "planner/blocks.h"
 
+#include <stdio.h>
 #include <string.h>
 
 typedef struct form_layout {
     const morph_structure *structure;
     int intervals;
     bool lengths, durations;
+    bool even;   /* one duration for all intervals */
     double unit; /* s */
 } form_layout;
 
@@ -27,8 +29,16 @@ static int form_length_at(const form_layout *l, int pose) {
 static int form_duration_at(const form_layout *l) {
     return form_length_at(l, l->lengths ? l->intervals + 1 : 0);
 }
+static int form_durations(const form_layout *l) {
+    return !l->durations ? 0 : l->even ? 1 : l->intervals;
+}
 static int form_unknowns(const form_layout *l) {
-    return form_duration_at(l) + (l->durations ? l->intervals : 0);
+    return form_duration_at(l) + form_durations(l);
+}
+/* The unknown of an interval's duration; beyond the ends the end's. */
+static int form_duration_of(const form_layout *l, int k) {
+    const int last = form_durations(l) - 1;
+    return form_duration_at(l) + (k < 0 ? 0 : k > last ? last : k);
 }
 
 /* Objective: weight * sum |x_{k-1} - 2 x_k + x_{k+1}|^2 over inner poses. */
@@ -135,7 +145,7 @@ static morph_block form_block_links(const morph_structure *s, const int *unknown
                          .describe = form_links_describe};
 }
 
-/* Objective: weight * sum of durations. */
+/* Objective: weight * mean duration. */
 typedef struct form_time {
     const form_layout *layout;
     double weight;
@@ -144,8 +154,8 @@ typedef struct form_time {
 static morph_status form_time_value(void *data, const double *x, double *f) {
     const form_time *d = data;
     f[0] = 0.0;
-    for (int k = 0; k < d->layout->intervals; k++)
-        f[0] += d->weight * x[form_duration_at(d->layout) + k];
+    for (int k = 0; k < form_durations(d->layout); k++)
+        f[0] += d->weight / form_durations(d->layout) * x[form_duration_of(d->layout, k)];
     return MORPH_OK;
 }
 
@@ -153,8 +163,8 @@ static morph_status form_time_walk(void *data, const double *x, const double *we
     const form_time *d = data;
     (void)x;
     (void)weight;
-    for (int k = 0; k < d->layout->intervals && morph_sink_wants_jacobian(sink); k++)
-        morph_sink_jacobian(sink, 0, form_duration_at(d->layout) + k, d->weight);
+    for (int k = 0; k < form_durations(d->layout) && morph_sink_wants_jacobian(sink); k++)
+        morph_sink_jacobian(sink, 0, form_duration_of(d->layout, k), d->weight / form_durations(d->layout));
     return MORPH_OK;
 }
 
@@ -259,17 +269,23 @@ static form_jet form_row_jet(const form_layout *l, const form_row *r, const doub
     for (int m = 0; m <= r->order; m++)
         L[m] = form_variable(form_length(l, x, form_clamp(r->first + m, l->intervals), r->link), m, n);
     for (int m = 0; m < r->order; m++)
-        h[m] = form_variable(x[form_duration_at(l) + form_clamp(r->first + m, l->intervals - 1)],
-                             r->order + 1 + m, n);
+        h[m] = form_variable(x[form_duration_of(l, r->first + m)], r->order + 1 + m, n);
     const form_jet f = form_difference(r->order, L, h);
     return form_combine(r->scale, &f, 0.0, &f);
 }
 
+/* The rows in use. */
+typedef struct form_motion {
+    const form_layout *layout;
+    int count;
+    const int *row;
+} form_motion;
+
 static morph_status form_motion_value(void *data, const double *x, double *f) {
-    const form_layout *l = data;
-    for (int row = 0; row < form_motion_rows(l); row++) {
-        const form_row r = form_row_of(l, row);
-        f[row] = form_row_jet(l, &r, x, false).v;
+    const form_motion *d = data;
+    for (int k = 0; k < d->count; k++) {
+        const form_row r = form_row_of(d->layout, d->row[k]);
+        f[k] = form_row_jet(d->layout, &r, x, false).v;
     }
     return MORPH_OK;
 }
@@ -304,8 +320,7 @@ static void form_fill_slots(const form_layout *l, const form_row *r, const doubl
                 form_put_slot(s, at + 3 * ends[e] + k, m, (e ? 1.0 : -1.0) * s->d[m][k] / s->length[m]);
     }
     for (int m = 0; m < r->order; m++)
-        form_put_slot(s, form_duration_at(l) + form_clamp(r->first + m, l->intervals - 1), r->order + 1 + m,
-                      1.0);
+        form_put_slot(s, form_duration_of(l, r->first + m), r->order + 1 + m, 1.0);
 }
 
 /* Second derivative of a length |d| by two of its own six coordinates: +-(I - d d^T / |d|^2) / |d|. */
@@ -329,36 +344,40 @@ static void form_put_hessian(const form_layout *l, const form_row *r, const form
 }
 
 static morph_status form_motion_walk(void *data, const double *x, const double *weight, morph_sink *sink) {
-    const form_layout *l = data;
-    for (int row = 0; row < form_motion_rows(l); row++) {
-        const form_row r = form_row_of(l, row);
-        const form_jet f = form_row_jet(l, &r, x, true);
+    const form_motion *d = data;
+    for (int k = 0; k < d->count; k++) {
+        const form_row r = form_row_of(d->layout, d->row[k]);
+        const form_jet f = form_row_jet(d->layout, &r, x, true);
         form_slots s;
-        form_fill_slots(l, &r, x, &s);
+        form_fill_slots(d->layout, &r, x, &s);
         for (int p = 0; p < s.count && morph_sink_wants_jacobian(sink); p++)
-            morph_sink_jacobian(sink, row, s.unknown[p], f.g[s.variable[p]] * s.slope[p]);
-        if (morph_sink_wants_hessian(sink)) form_put_hessian(l, &r, &s, &f, weight[row], sink);
+            morph_sink_jacobian(sink, k, s.unknown[p], f.g[s.variable[p]] * s.slope[p]);
+        if (morph_sink_wants_hessian(sink)) form_put_hessian(d->layout, &r, &s, &f, weight[k], sink);
     }
     return MORPH_OK;
 }
 
 static void form_motion_describe(void *data, int row, char *text, size_t size) {
-    const form_row r = form_row_of(data, row);
-    morph_link_name(((const form_layout *)data)->structure, r.link, text, size);
+    const form_motion *d = data;
+    static const char *const kind[] = {"", "rate of ", "acceleration of ", "jerk of "};
+    const form_row r = form_row_of(d->layout, d->row[row]);
+    snprintf(text, size, "%s", kind[r.order]);
+    const size_t used = strlen(text);
+    morph_link_name(d->layout->structure, r.link, text + used, size - used);
 }
 
-/* lower, upper: form_motion_rows entries, filled. */
-static morph_block form_block_motion(form_layout *layout, double *lower, double *upper) {
-    for (int row = 0; row < form_motion_rows(layout); row++) {
-        lower[row] = -1.0;
-        upper[row] = 1.0;
+/* lower, upper: count entries, filled. */
+static morph_block form_block_motion(form_motion *data, double *lower, double *upper) {
+    for (int k = 0; k < data->count; k++) {
+        lower[k] = -1.0;
+        upper[k] = 1.0;
     }
     return (morph_block){.name = "motion",
-                         .rows = form_motion_rows(layout),
-                         .unknowns = form_unknowns(layout),
+                         .rows = data->count,
+                         .unknowns = form_unknowns(data->layout),
                          .lower = lower,
                          .upper = upper,
-                         .data = layout,
+                         .data = data,
                          .value = form_motion_value,
                          .walk = form_motion_walk,
                          .describe = form_motion_describe};

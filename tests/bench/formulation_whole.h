@@ -14,12 +14,15 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 
 enum { FORM_POSES = 64, FORM_ROUNDS = 5, FORM_INSERTIONS = 6, FORM_FINE = 12 };
 
 typedef struct form_weights {
-    double near, smooth, time; /* of distance to the start's poses, second differences, time over its start */
-    double seconds;            /* wall, for all solves together */
+    double near;    /* of distance to the first poses, without durations */
+    double smooth;  /* of second differences */
+    double time;    /* of time over that at the start, with durations */
+    double seconds; /* of this process, for all solves together */
 } form_weights;
 
 /* What the solves came to; sizes without fixed unknowns, of the largest problem. */
@@ -32,6 +35,11 @@ typedef struct form_effort {
     char row[160];    /* the worst of them */
 } form_effort;
 
+/* Seconds of this process: others on the machine do not count. */
+static double form_cpu(void) {
+    return (double)clock() / CLOCKS_PER_SEC;
+}
+
 typedef struct form_whole {
     const morph_world *world;
     form_layout layout;
@@ -40,8 +48,8 @@ typedef struct form_whole {
     double s[FORM_POSES], inset[FORM_POSES], duration[FORM_POSES];
     morph_active *active[FORM_POSES];
     form_effort effort;
-    double started;
-    bool holds; /* every pose inside its limits */
+    double until; /* form_cpu() */
+    bool holds;   /* every pose inside its limits */
 } form_whole;
 
 static void form_free(form_whole *w) {
@@ -83,7 +91,7 @@ static morph_inset form_inset(const form_whole *w, int k) {
  * accelerations with its square, jerks with its cube. */
 static morph_status form_set_unit(form_whole *w) {
     form_layout l = w->layout;
-    l.lengths = false;
+    l.lengths = l.even = false;
     l.durations = true;
     l.unit = 1.0;
     const size_t n = (size_t)form_unknowns(&l);
@@ -91,7 +99,7 @@ static morph_status form_set_unit(form_whole *w) {
     if (!x) return MORPH_ERR_NOMEM;
     memcpy(x, w->x, (size_t)form_duration_at(&l) * sizeof *x);
     for (int k = 0; k < l.intervals; k++)
-        x[form_duration_at(&l) + k] = 1.0;
+        x[form_duration_of(&l, k)] = 1.0;
     w->layout.unit = 1e-3; /* where nothing moves */
     for (int row = 0; row < form_motion_rows(&l); row++) {
         const form_row r = form_row_of(&l, row);
@@ -120,7 +128,8 @@ static void form_first_poses(form_whole *w, const double *start, const double *e
 static morph_status form_create(const morph_world *world, const form_layout *layout,
                                 const form_weights *weights, const double *start, const double *end,
                                 form_whole *w) {
-    *w = (form_whole){.world = world, .layout = *layout, .weights = *weights, .started = morph_seconds()};
+    *w = (form_whole){
+        .world = world, .layout = *layout, .weights = *weights, .until = form_cpu() + weights->seconds};
     w->layout.structure = world->structure;
     w->x = morph_alloc(FORM_POSES * (size_t)form_width(&w->layout), sizeof(double));
     w->reference = morph_alloc(FORM_POSES * (size_t)form_width(&w->layout), sizeof(double));
@@ -128,17 +137,19 @@ static morph_status form_create(const morph_world *world, const form_layout *lay
     for (int k = 0; k < FORM_POSES && status == MORPH_OK; k++)
         status = morph_active_create(world->structure, &w->active[k]);
     if (status == MORPH_OK) form_first_poses(w, start, end);
-    return status == MORPH_OK ? form_set_unit(w) : status;
+    return status;
 }
 
 /* One problem in the making. */
 typedef struct form_problem {
     double *x, *lower, *upper, *motion_lower, *motion_upper, *zeros;
-    int *map; /* poses x (width + links) */
+    int *map;  /* poses x (width + links) */
+    int *list; /* rows of motion */
     morph_block *block;
     morph_near_term near[FORM_POSES];
     form_smooth smooth;
     form_time time;
+    form_motion motion;
     int blocks;
 } form_problem;
 
@@ -150,6 +161,7 @@ static void form_problem_free(form_problem *p) {
     free(p->motion_upper);
     free(p->zeros);
     free(p->map);
+    free(p->list);
     free(p->block);
 }
 
@@ -164,9 +176,10 @@ static morph_status form_problem_allocate(const form_layout *l, form_problem *p)
     p->motion_upper = morph_alloc((size_t)form_motion_rows(l), sizeof(double));
     p->zeros = morph_alloc((size_t)l->structure->links, sizeof(double));
     p->map = morph_alloc(poses * each, sizeof(int));
+    p->list = morph_alloc((size_t)form_motion_rows(l), sizeof(int));
     p->block = morph_alloc(poses * (MORPH_POSE_BLOCKS + 2) + 3, sizeof(morph_block));
     return p->x && p->lower && p->upper && p->motion_lower && p->motion_upper && p->zeros && p->map &&
-                   p->block
+                   p->list && p->block
                ? MORPH_OK
                : MORPH_ERR_NOMEM;
 }
@@ -211,7 +224,7 @@ static morph_status form_pose_rows(form_whole *w, form_problem *p, int k) {
     for (int b = 0; b < count; b++)
         if (!l->lengths || strcmp(rows[b].name, "length") != 0) p->block[p->blocks++] = rows[b];
     if (l->lengths) p->block[p->blocks++] = form_block_links(l->structure, map, p->zeros);
-    if (w->weights.near > 0.0) {
+    if (!l->durations) {
         p->near[k] = (morph_near_term){n, &w->reference[(size_t)k * (size_t)n], w->weights.near};
         p->block[p->blocks++] = morph_block_near(&p->near[k], map);
     }
@@ -229,16 +242,21 @@ static morph_status form_problem_fill(form_whole *w, form_problem *p) {
     p->smooth = (form_smooth){l, w->weights.smooth};
     p->block[p->blocks++] = form_block_smooth(&p->smooth);
     if (!l->durations) return MORPH_OK;
-    for (int k = 0; k < l->intervals; k++) {
-        const int u = form_duration_at(l) + k;
+    for (int k = 0; k < form_durations(l); k++) {
+        const int u = form_duration_of(l, k);
         p->x[u] = w->duration[k];
-        /* A hundredth to ten times of where it starts: neither end is of use. */
-        p->lower[u] = 0.01;
-        p->upper[u] = 10.0;
+        /* Where it starts is slow: neither end is of use. */
+        p->lower[u] = 0.1;
+        p->upper[u] = 2.0;
     }
-    p->time = (form_time){l, w->weights.time / l->intervals};
+    p->time = (form_time){l, w->weights.time};
     p->block[p->blocks++] = form_block_time(&p->time);
-    p->block[p->blocks++] = form_block_motion(l, p->motion_lower, p->motion_upper);
+    /* All of them: with those near their limits alone a solve runs away through the others, whose least time
+     * has no bound of its own. */
+    for (int row = 0; row < form_motion_rows(l); row++)
+        p->list[row] = row;
+    p->motion = (form_motion){l, form_motion_rows(l), p->list};
+    p->block[p->blocks++] = form_block_motion(&p->motion, p->motion_lower, p->motion_upper);
     return MORPH_OK;
 }
 
@@ -275,11 +293,15 @@ static void form_note(form_whole *w, const morph_nlp *nlp, const morph_nlp_resul
 
 /* The options of all formulations: those of the product's projections (planner/project.c), but for the
  * number of iterations, which one problem in place of many cannot do with. */
-static morph_nlp_options form_options(double seconds) {
+static morph_nlp_options form_options(const morph_control *control) {
     morph_nlp_options o = morph_nlp_defaults();
     o.tolerance = 1e-5;
-    o.max_seconds = seconds;
+    o.control = control;
     return o;
+}
+
+static int form_late(void *user) {
+    return form_cpu() > ((const form_whole *)user)->until;
 }
 
 static morph_status form_solve(form_whole *w, bool *solved) {
@@ -292,15 +314,16 @@ static morph_status form_solve(form_whole *w, bool *solved) {
         status = morph_nlp_create(form_unknowns(l), p.x, p.lower, p.upper, p.block, p.blocks, message,
                                   sizeof message, &nlp);
     if (status == MORPH_ERR_INPUT) fprintf(stderr, "%s\n", message);
-    const morph_nlp_options o = form_options(fmax(1.0, w->started + w->weights.seconds - morph_seconds()));
+    const morph_control control = {.stop = form_late, .user = w};
+    const morph_nlp_options o = form_options(&control);
     morph_nlp_result r = {0};
     if (status == MORPH_OK) status = morph_nlp_solve(nlp, p.x, &o, &r);
     if (status == MORPH_OK) {
         form_note(w, nlp, &r);
         const size_t all = (size_t)(l->intervals + 1) * (size_t)form_width(l);
         memcpy(w->x, r.x, all * sizeof *w->x);
-        for (int k = 0; k < l->intervals && l->durations; k++)
-            w->duration[k] = r.x[form_duration_at(l) + k];
+        for (int k = 0; k < form_durations(l); k++)
+            w->duration[k] = r.x[form_duration_of(l, k)];
         *solved = r.outcome == MORPH_OPTIMAL || r.outcome == MORPH_FEASIBLE;
         if (getenv("FORM_LOG"))
             fprintf(stderr,
@@ -337,7 +360,7 @@ static morph_status form_settle(form_whole *w) {
     morph_status status = form_examine(w, &inside);
     w->holds = false;
     for (int round = 0; round < FORM_ROUNDS && status == MORPH_OK && !w->holds; round++) {
-        if (morph_seconds() > w->started + w->weights.seconds) break;
+        if (form_late(w)) break;
         status = form_solve(w, &solved);
         if (status == MORPH_OK) status = form_examine(w, &inside);
         w->holds = inside && solved;
@@ -405,7 +428,7 @@ static void form_insert(form_whole *w, const morph_curve *c, double *scratch, in
         w->reference[at * n + i] = 0.5 * (w->reference[(at - 1) * n + i] + w->reference[(at + 1) * n + i]);
     }
     w->inset[at] = 0.5 * (w->inset[k] + w->inset[at + 1]);
-    w->duration[k] = w->duration[at] = 0.5 * w->duration[k];
+    if (!w->layout.even) w->duration[k] = w->duration[at] = 0.5 * w->duration[k];
 }
 
 /* Inserts a pose into every interval that breaks a limit, as the product's path does. */
@@ -422,9 +445,22 @@ static morph_status form_mend(form_whole *w, const morph_curve *c, const double 
     return MORPH_OK;
 }
 
+/* With durations the start is the path of least smoothness at a pace that holds every limit: inside all rows.
+ */
+static morph_status form_start(form_whole *w) {
+    if (!w->layout.durations) return MORPH_OK;
+    w->layout.durations = false;
+    morph_status status = form_settle(w);
+    w->layout.durations = true;
+    form_set_parameters(w);
+    memcpy(w->reference, w->x,
+           (size_t)(w->layout.intervals + 1) * (size_t)form_width(&w->layout) * sizeof *w->x);
+    return status == MORPH_OK ? form_set_unit(w) : status;
+}
+
 /* The whole path: *curve is returned also where it does not hold. */
 static morph_status form_run(form_whole *w, morph_curve **curve) {
-    morph_status status = MORPH_OK;
+    morph_status status = form_start(w);
     bool changed = true;
     for (int round = 0; round <= FORM_INSERTIONS && changed && status == MORPH_OK; round++) {
         double worst[FORM_POSES];
@@ -434,8 +470,7 @@ static morph_status form_run(form_whole *w, morph_curve **curve) {
         form_set_parameters(w);
         if (status == MORPH_OK) status = form_draw(w, curve);
         if (status == MORPH_OK) status = form_between(w->world, *curve, &v, worst);
-        if (status == MORPH_OK && w->holds && round < FORM_INSERTIONS &&
-            morph_seconds() < w->started + w->weights.seconds)
+        if (status == MORPH_OK && w->holds && round < FORM_INSERTIONS && !form_late(w))
             status = form_mend(w, *curve, worst, &changed);
     }
     return status;
