@@ -1,4 +1,5 @@
-/* Formulations of the path beside each other: bench_formulations [-n NODES] [-t SECONDS] [SCENE ...].
+/* Formulations of the path beside each other: bench_formulations [-n NODES] [-t SECONDS]
+ * [-f NAME,...] [SCENE ...].
  *
  * From the same flat start to the same refined end, with the same limits, room and solver options:
  *   A   the product: pose by pose (joints as unknowns), then timing of the fixed path
@@ -288,7 +289,24 @@ static void print_outcome(const outcome *o) {
     fflush(stdout);
 }
 
-static void compare(const morph_planner *p, double seconds) {
+/* Is the name in a list with commas? NULL lists all. */
+static bool listed(const char *list, const char *name) {
+    const size_t size = strlen(name);
+    for (const char *at = list; at; at = strchr(at, ',')) {
+        if (*at == ',') at++;
+        if (strncmp(at, name, size) == 0 && (at[size] == ',' || at[size] == '\0')) return true;
+    }
+    return !list;
+}
+
+/* What the command line says. */
+typedef struct settings {
+    int nodes;          /* a side; 0: the scene's */
+    double seconds;     /* of the process, for each formulation */
+    const char *wanted; /* names with commas; NULL: all */
+} settings;
+
+static void compare(const morph_planner *p, const settings *set) {
     static const formulation all[] = {{"A", false, false, false}, {"A1", false, false, false},
                                       {"B", true, false, false},  {"C", false, true, false},
                                       {"C1", false, true, true},  {"D", true, true, false},
@@ -298,7 +316,8 @@ static void compare(const morph_planner *p, double seconds) {
            "check", "T disc", "T own", "T");
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         outcome o = {.name = all[k].name};
-        const morph_status status = k == 0 ? product(p, &o) : whole(p, &all[k], seconds, &o);
+        if (!listed(set->wanted, o.name)) continue;
+        const morph_status status = k == 0 ? product(p, &o) : whole(p, &all[k], set->seconds, &o);
         if (status == MORPH_OK)
             print_outcome(&o);
         else
@@ -312,10 +331,10 @@ static void say(void *user, const char *text) {
 }
 
 /* The planner's stages up to the refined end, then every formulation. */
-static bool run_scene(const char *path, int nodes, double seconds) {
+static bool run_scene(const char *path, const settings *set) {
     morph_scene *scene = NULL;
     if (morph_scene_read(path, say, say, NULL, &scene) != MORPH_OK) return false;
-    if (nodes > 0) scene->structure.nodes[0] = scene->structure.nodes[1] = nodes;
+    if (set->nodes > 0) scene->structure.nodes[0] = scene->structure.nodes[1] = set->nodes;
     const morph_plan_options options = {.method = MORPH_METHOD_IPOPT};
     morph_planner p = {.scene = scene, .options = &options, .started = morph_seconds(), .deadline = INFINITY};
     p.way = &p.nominal;
@@ -331,7 +350,7 @@ static bool run_scene(const char *path, int nodes, double seconds) {
         printf("\n%s at %d x %d: refined in %.1f s (%s)\n", path, scene->structure.nodes[0],
                scene->structure.nodes[1], morph_seconds() - p.started,
                p.refined.feasible ? "feasible" : "infeasible");
-        compare(&p, seconds);
+        compare(&p, set);
     } else {
         fprintf(stderr, "%s: %s\n", path, morph_status_text(status));
     }
@@ -347,19 +366,21 @@ static bool run_scene(const char *path, int nodes, double seconds) {
 
 int main(int argc, char **argv) {
     static const char *const scenes[] = {"examples/scenes/box_4.yaml", "examples/scenes/sphere_4.yaml"};
-    int nodes = 0, given = 0;
-    double seconds = 60.0;
+    settings set = {.seconds = 60.0};
+    int given = 0;
     bool good = true;
     morph_blas_threads(1);
     if (!check_derivatives()) return 1;
     for (int k = 1; k < argc; k++)
         if (strcmp(argv[k], "-n") == 0 && k + 1 < argc)
-            nodes = atoi(argv[++k]);
+            set.nodes = atoi(argv[++k]);
         else if (strcmp(argv[k], "-t") == 0 && k + 1 < argc)
-            seconds = atof(argv[++k]);
+            set.seconds = atof(argv[++k]);
+        else if (strcmp(argv[k], "-f") == 0 && k + 1 < argc)
+            set.wanted = argv[++k];
         else
-            given++, good = run_scene(argv[k], nodes, seconds) && good;
+            given++, good = run_scene(argv[k], &set) && good;
     for (size_t k = 0; k < sizeof scenes / sizeof *scenes && !given; k++)
-        good = run_scene(scenes[k], nodes, seconds) && good;
+        good = run_scene(scenes[k], &set) && good;
     return good ? 0 : 2;
 }

@@ -325,11 +325,6 @@ static morph_status form_solve(form_whole *w, bool *solved) {
         for (int k = 0; k < form_durations(l); k++)
             w->duration[k] = r.x[form_duration_of(l, k)];
         *solved = r.outcome == MORPH_OPTIMAL || r.outcome == MORPH_FEASIBLE;
-        if (getenv("FORM_LOG"))
-            fprintf(stderr,
-                    "  %d poses, %d unknowns, %d rows: %s (%s), %d iterations, %.2f s, worst %.2g %s\n",
-                    l->intervals + 1, r.unknowns, r.rows, morph_outcome_text(r.outcome), r.solver_text,
-                    r.iterations, r.seconds, r.violation, w->effort.row);
     }
     morph_nlp_result_free(&r);
     morph_nlp_destroy(nlp);
