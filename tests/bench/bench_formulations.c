@@ -12,6 +12,7 @@
  *   D1  as C1 with the lengths as unknowns too
  * T disc: the end time as C and D have it; T own: the same stretched until a smooth curve through their poses
  * at their times holds its limits; T: the product's timing of the path. SECONDS: of the process, for each.
+ * Without a scene: box, sphere and ellipsoid at 4 x 4 nodes.
  * Each block that is new here is first checked against central differences. What comes out is examined by the
  * same code for all: between poses on a fine grid from raw positions, and by the checker on a schedule. */
 #include "formulation_whole.h"
@@ -365,7 +366,8 @@ static bool run_scene(const char *path, const settings *set) {
 }
 
 int main(int argc, char **argv) {
-    static const char *const scenes[] = {"examples/scenes/box_4.yaml", "examples/scenes/sphere_4.yaml"};
+    static const char *const scenes[] = {"examples/scenes/box_4.yaml", "examples/scenes/sphere_4.yaml",
+                                         "examples/scenes/ellipsoid.yaml"};
     settings set = {.seconds = 60.0};
     int given = 0;
     bool good = true;
@@ -380,6 +382,7 @@ int main(int argc, char **argv) {
             set.wanted = argv[++k];
         else
             given++, good = run_scene(argv[k], &set) && good;
+    if (!given && set.nodes == 0) set.nodes = 4;
     for (size_t k = 0; k < sizeof scenes / sizeof *scenes && !given; k++)
         good = run_scene(scenes[k], &set) && good;
     return good ? 0 : 2;
