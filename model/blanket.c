@@ -269,12 +269,46 @@ static bool refused(const morph_blanket_state *b, const morph_violation *polishe
            (!b->held_up && gives_way(b, &raw, RAW_DEPTH, RAW_DEPTH, report));
 }
 
+/* The target stands from now on; where it stands already, it draws back a little in this frame. */
+static void hold_up(morph_blanket_state *b, const frame_start *at, const morph_blanket_report *cause,
+                    morph_blanket_report *report) {
+    if (b->held_up)
+        b->retreat += RETREAT * b->structure->spacing / b->def.frame;
+    else {
+        report->held_time = at->time;
+        report->held_by = cause->held_by;
+        report->held_element = cause->held_element;
+    }
+    b->held_up = report->held_up = true;
+}
+
+/* A frame; where no step is short enough to keep the rising target from coming through, the target stops as
+ * for a limit. */
+static morph_status next_or_hold(morph_blanket_state *b, const frame_start *at, int *steps,
+                                 morph_blanket_report *report) {
+    const int before = *steps;
+    morph_status status = next_frame(b, at, steps, report);
+    for (int tries = 0; tries < MOST_RETREATS && status == MORPH_ERR_MOTION; tries++) {
+        if (!(b->def.rise > 0.0)) return status;
+        rewind_frame(b, at);
+        if (!rising(b) && !b->held_up) return status;
+        morph_blanket_report cause = {.held_element = -1};
+        resisting(b, &cause);
+        hold_up(b, at, &cause, report);
+        b->status = MORPH_OK;
+        b->guard.through = 0;
+        *steps = before;
+        status = next_frame(b, at, steps, report);
+    }
+    return status;
+}
+
 /* The frame done again from its start, and its record. */
 static morph_status repeat_frame(morph_blanket_state *b, const frame_start *at, int *steps,
                                  morph_trajectory *t, morph_blanket_report *report, morph_violation *v) {
     const double time = --t->frames * b->def.frame;
     rewind_frame(b, at);
-    const morph_status status = next_frame(b, at, steps, report);
+    const morph_status status = next_or_hold(b, at, steps, report);
     if (status == MORPH_OK) *v = record(b, time, t);
     return status;
 }
@@ -299,20 +333,14 @@ static morph_status record_next(morph_blanket_state *b, int *steps, morph_trajec
     const bool rose = rising(b);
     const frame_start at = keep_frame(b);
     b->retreat = 0.0;
-    morph_status status = next_frame(b, &at, steps, report);
+    morph_status status = next_or_hold(b, &at, steps, report);
     if (status != MORPH_OK) return status;
     morph_violation v = record(b, time, t);
     status = review(b, &at, steps, t, report, &v);
     if (status != MORPH_OK) return status;
     morph_blanket_report cause;
     for (int tries = 0; tries < MOST_RETREATS && (rose || b->held_up) && refused(b, &v, &cause); tries++) {
-        if (!b->held_up) {
-            report->held_time = at.time;
-            report->held_by = cause.held_by;
-            report->held_element = cause.held_element;
-        } else
-            b->retreat += RETREAT * b->structure->spacing / b->def.frame;
-        b->held_up = report->held_up = true;
+        hold_up(b, &at, &cause, report);
         status = repeat_frame(b, &at, steps, t, report, &v);
         if (status != MORPH_OK) return status;
     }

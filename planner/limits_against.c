@@ -21,10 +21,10 @@ typedef enum against_kind {
 enum { NAMED = 3, PARTS = 3, CAUSES = PARTS * AGAINST_KINDS };
 
 /* What is compared is how much less would be missed, to first order, if a limit gave way: a length or a
- * distance by a tenth of a spacing, an angle by a tenth of a right angle; a stuck link as far as the limits
+ * distance by a tenth of a spacing, an angle by as much at a link's end; a stuck link as far as the limits
  * of its layer let it go, for it has no limit that one could move. */
 #define GIVE_LENGTH 0.1
-#define GIVE_ANGLE 0.157
+#define GIVE_ANGLE 0.1
 
 typedef struct candidate {
     against_kind kind;

@@ -132,8 +132,8 @@ static morph_status rounds(morph_placer *p, const morph_attractor *centre, int c
         if (morph_stopped(p->options->control)) return MORPH_ERR_STOPPED;
         morph_progress(p->options->control, "placement", p->out->rounds / (double)p->options->rounds);
         if (morph_placer_late(p)) break;
-        /* Nothing won, or where nothing was, nothing to be hoped for from a shorter step. */
-        if ((gain > 0.0 ? gain : hope) < p->options->least_gain * before) break;
+        /* Little won; or nothing, and little to be hoped for from a shorter step. */
+        if ((gain > 0.0 ? gain : 0.5 * hope) < p->options->least_gain * before) break;
         p->reach *= gain > 0.0 ? 1.25 : 0.5;
         p->reach = fmin(p->reach, 0.4);
         if (gain > 0.0) memcpy(from, p->out->centre, sizeof from);

@@ -133,8 +133,9 @@ static void set_along(const morph_placer *p, const morph_attractor *from, const 
 /* The program sees as far as springs say true of friction: what it holds back may slide on. */
 morph_status morph_trial_along(morph_placer *p, const morph_attractor *from, morph_trial *best) {
     morph_attractor to[MORPH_MOST_CENTRES];
-    const bool farther = morph_placer_objective(p, &best->measure) < p->objective;
-    bool again = true;
+    const double reached = morph_placer_objective(p, &best->measure);
+    const bool farther = reached < p->objective;
+    bool again = (farther ? reached : best->predicted) < (1.0 - WORTH) * p->objective;
     morph_status status = MORPH_OK;
     memcpy(to, best->centre, sizeof to);
     for (double factor = farther ? 2.0 : 0.5; again && factor <= FARTHEST && !morph_placer_late(p);

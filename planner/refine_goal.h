@@ -34,8 +34,8 @@ morph_status morph_aim_rows(morph_aim *aim, double *x, double reach, double hard
 
 /* Names the limits that stood against a goal, by the multipliers of a solve that minimised the miss alone:
  * each multiplier is how much less would be missed (in spacings, by all prices) per unit of its row; with the
- * row's slope and what the limit is let give way (a tenth of a spacing or of a right angle; a stuck link as
- * far as its layer's limits go) it becomes what that would save. Limits that hang on one number of the scene
+ * row's slope and what the limit is let give way (a tenth of a spacing or of a radian; a stuck link as far as
+ * its layer's limits go) it becomes what that would save. Limits that hang on one number of the scene
  * are one cause; target and base plane are one too. First the strongest limit of each of the three causes
  * whose sum is largest, then, where there are fewer, the next strongest. blocks, count: as
  * given to morph_nlp_create, base: lower bounds of coordinates from the base plane. "" if nothing stood

@@ -43,10 +43,10 @@ holds 'a link between held nodes keeps its length' awk -F, '
     NR > 1 { d = $2 - 0.1; if (d < 0) d = -d; if (d > 1e-9) exit 1; n++ } END { if (n < 10) exit 1 }' \
     "$work/edge.csv"
 
-# A target that is held up by a stiff blanket is raised under it before the refinement.
+# A ball that rises into a stiff blanket whose border is held.
 cat >"$work/short.yaml" <<'SCENE'
 morphplan: 1
-structure: {nodes: [5, 5], spacing: 0.1, fixed: border, support: frame, link: {stiffness: 20}}
+structure: {nodes: [5, 5], spacing: 0.1, fixed: border, support: frame, link: {stiffness: 2000}}
 target: {shape: sphere, radius: 0.15, at: [0, 0, -0.07]}
 motion: {mode: rise, height: 0.12, friction: 0.4, time: 0.4}
 base: 0.0
