@@ -291,8 +291,24 @@ static bool same(const morph_limits *l, int p, const morph_limits *m, int q) {
            memcmp(l->element[p].weight, m->element[q].weight, sizeof l->element[p].weight) == 0;
 }
 
+/* The pair of limit q of m has one among the first n of l already, and its axes are no nearer than `slid` to
+ * touching (negative: overlapping). */
+static bool slid_only(const morph_balance *b, int n, const morph_limits *m, int q, const double *x,
+                      double slid) {
+    const morph_element *e = &m->element[q];
+    bool listed = false;
+    for (int p = 0; p < n && !listed && e->kind == MORPH_ELEMENT_APART; p++)
+        listed = b->limits.element[p].kind == e->kind &&
+                 memcmp(b->limits.element[p].joint, e->joint, sizeof e->joint) == 0;
+    if (!listed) return false;
+    double u, v;
+    const double d = morph_segment_segment(&x[3 * e->joint[0]], &x[3 * e->joint[1]], &x[3 * e->joint[2]],
+                                           &x[3 * e->joint[3]], &u, &v);
+    return d - sqrt(m->edge[q]) > slid;
+}
+
 morph_status morph_balance_more_limits(morph_balance *b, const double *x, const morph_nearness *near,
-                                       int *added) {
+                                       double slid, int *added) {
     morph_limits old = b->limits;
     b->limits = (morph_limits){0};
     morph_status status = morph_balance_limits(b, x, near);
@@ -300,7 +316,7 @@ morph_status morph_balance_more_limits(morph_balance *b, const double *x, const 
     b->limits = old;
     const int before = old.count;
     for (int q = 0; q < found.count && status == MORPH_OK; q++) {
-        bool known = false;
+        bool known = slid_only(b, before, &found, q, x, slid);
         for (int p = 0; p < before && !known; p++)
             known = same(&b->limits, p, &found, q);
         if (!known && !add_limit(b, &found.element[q], found.sign[q], found.edge[q]))

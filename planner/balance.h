@@ -68,9 +68,11 @@ void morph_balance_destroy(morph_balance *b); /* NULL allowed */
  * before are forgotten. */
 morph_status morph_balance_limits(morph_balance *b, const double *x, const morph_nearness *near);
 
-/* Adds the limits that x stands within `near` of and that are not among them yet; *added may be NULL. */
+/* Adds the limits that x stands within `near` of and that are not among them yet; *added may be NULL. Closest
+ * points slide along a pair of axes: one that is listed with others is added again only where the axes
+ * overlap by `slid` or deeper (spacings, <= 0; 0: always). */
 morph_status morph_balance_more_limits(morph_balance *b, const double *x, const morph_nearness *near,
-                                       int *added);
+                                       double slid, int *added);
 
 /* Number of the first unknown of each kind. */
 int morph_balance_tau(const morph_balance *b);

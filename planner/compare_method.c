@@ -139,7 +139,8 @@ static morph_status run_seeds(morph_compare_shared *sh, morph_compare_row *row) 
     return status;
 }
 
-/* With and without gradients; the better of the two. */
+/* With and without gradients, each with the wall time and the number of centres that Ipopt took before it;
+ * the better of the two. */
 static morph_status run_nlopt(morph_compare_shared *sh, morph_compare_row *row) {
     static const morph_placement_method methods[2] = {MORPH_PLACE_NLOPT_GRADIENT, MORPH_PLACE_NLOPT_FREE};
     const double *end = sh->end[MORPH_COMPARE_BLANKET];
@@ -151,6 +152,10 @@ static morph_status run_nlopt(morph_compare_shared *sh, morph_compare_row *row) 
         morph_placement p;
         o.control = sh->control;
         o.method = methods[k];
+        if (sh->placement && sh->placement->centres > 0) {
+            o.seconds = sh->placement->seconds;
+            o.most_centres = sh->placement->centres;
+        }
         status = morph_placement_run(&sh->work, sh->scene, end, &o, &p);
         const morph_trajectory *t = &p.guided;
         if ((status == MORPH_OK || status == MORPH_ERR_STOPPED) && t->frames > 0 &&

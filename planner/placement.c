@@ -17,7 +17,7 @@ morph_placement_options morph_placement_defaults(void) {
                                      .cover_weight = MORPH_COVER_WEIGHT,
                                      .slide = 0.1,
                                      .reach = 0.3,
-                                     .least_gain = 0.02,
+                                     .least_gain = 0.03,
                                      .least_growth = 0.05,
                                      .strongest = 60.0,
                                      .thrift = 1e-7,
@@ -25,9 +25,9 @@ morph_placement_options morph_placement_defaults(void) {
                                      .last_reach = 0.003,
                                      .epsilon = 1e-3,
                                      .last_epsilon = 9e-7,
-                                     .iterations = 60,
-                                     .last_iterations = 150,
-                                     .rounds = 8,
+                                     .iterations = 50,
+                                     .last_iterations = 120,
+                                     .rounds = 6,
                                      .most_centres = 3};
 }
 
@@ -116,8 +116,13 @@ static morph_status round_of(morph_placer *p, const morph_attractor *centre, int
 /* A round that had no success with this has no other to hope for: steps as short as friction holds. */
 #define LEAST_REACH 0.15
 
-/* Fewer lead nowhere from the seeds. */
-enum { FEWEST_ROUNDS = 3 };
+/* Fewer lead nowhere: the long steps leave as many over for the cautious way. */
+enum { FEWEST_ROUNDS = 2 };
+
+static bool rounds_left(const morph_placer *p) {
+    const int kept = p->bold && p->leapt ? FEWEST_ROUNDS : 0;
+    return p->out->rounds < p->options->rounds - kept;
+}
 
 /* Rounds with a number of centres until they gain little. The first starts from `centre`. */
 static morph_status rounds(morph_placer *p, const morph_attractor *centre, int centres) {
@@ -125,7 +130,7 @@ static morph_status rounds(morph_placer *p, const morph_attractor *centre, int c
     morph_attractor from[MORPH_MOST_CENTRES];
     memcpy(from, centre, sizeof from);
     p->reach = p->options->reach;
-    while (status == MORPH_OK && p->out->rounds < p->options->rounds && p->reach > LEAST_REACH) {
+    while (status == MORPH_OK && rounds_left(p) && p->reach > LEAST_REACH) {
         const double before = p->objective;
         double gain, hope;
         status = round_of(p, from, centres, &gain, &hope);
@@ -146,7 +151,7 @@ static morph_status grow(morph_placer *p) {
     morph_status status = MORPH_OK;
     const double a = p->w->structure->spacing;
     while (status == MORPH_OK && p->out->centres < p->options->most_centres && !morph_placer_late(p) &&
-           p->out->rounds < p->options->rounds) {
+           rounds_left(p)) {
         morph_attractor centre[MORPH_MOST_CENTRES], more[1];
         const double before = p->objective;
         int found = 0;
@@ -186,14 +191,15 @@ static void take_back(morph_placer *p, const stand *s) {
 }
 
 /* Long steps are quick and may end where friction lets no other follow: the rounds that they left over go
- * from the seeds with the programs' own steps. */
+ * from where the first was made, with the programs' own steps. */
 static morph_status cautiously(morph_placer *p) {
     if (!p->leapt || p->options->rounds - p->out->rounds < FEWEST_ROUNDS || morph_placer_late(p))
         return MORPH_OK;
     stand first = put_by(p);
     p->bold = false;
-    morph_status status = run_seeds(p);
-    if (status == MORPH_OK) status = rounds(p, p->out->seed, p->out->seeds);
+    morph_status status = morph_trial_branch(p);
+    const morph_placement *out = p->out;
+    if (status == MORPH_OK) status = rounds(p, out->centre, out->centres);
     if (status == MORPH_OK) status = grow(p);
     if (p->out->guided.frames > 0 && p->objective < first.objective)
         morph_trajectory_free(&first.placement.guided);
@@ -247,6 +253,7 @@ morph_status morph_placement_run(const morph_workspace *w, const morph_scene *sc
     const morph_status status = p.x && p.scaled ? place(&p, x0) : MORPH_ERR_NOMEM;
     free(p.x);
     free(p.scaled);
+    morph_branch_free(&p.branch);
     out->seconds = morph_seconds() - p.started;
     if (status != MORPH_OK && status != MORPH_ERR_STOPPED) morph_placement_free(out);
     return status;

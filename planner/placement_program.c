@@ -4,9 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Joints within reach of where they are, centres within twice that, strengths within a factor of two. */
+/* A round's reach changes strengths by a factor of two at most, a shorter one by less in proportion. */
+#define FULL_REACH 0.3
+
+/* Joints within reach of where they are in z, centres within twice that, strengths within a factor. */
 static void set_bounds(const morph_balance *b, double reach, double strongest, const double *z, double *lower,
                        double *upper) {
+    const double change = fmin(1.0, reach / FULL_REACH);
     for (int i = 0; i < morph_balance_unknowns(b); i++) {
         lower[i] = -INFINITY;
         upper[i] = INFINITY;
@@ -24,8 +28,8 @@ static void set_bounds(const morph_balance *b, double reach, double strongest, c
             upper[i] = z[i] + 2.0 * reach;
         }
         const int s = morph_balance_strength(b) + m;
-        lower[s] = 0.5 * z[s];
-        upper[s] = fmin(strongest, 2.0 * z[s] + 1.0);
+        lower[s] = z[s] / (1.0 + change);
+        upper[s] = fmin(strongest, (1.0 + change) * z[s] + change);
     }
 }
 
@@ -78,7 +82,9 @@ static int fill_blocks(program *p, int n, morph_block *blocks) {
 /* The start is a point of the barrier's path already: a barrier far above that would drive it away. */
 #define FIRST_MU 1e-4
 
-static morph_status solve(program *p, double moves, double *z, morph_nlp_result *result) {
+/* From z, with bounds about where the blanket rests. */
+static morph_status solve(program *p, double moves, const morph_rest *rest, double *z,
+                          morph_nlp_result *result) {
     morph_balance *b = p->balance;
     const int n = morph_balance_unknowns(b), rows = b->rows + 2 * b->limits.count + b->equalities;
     morph_block blocks[4 + MORPH_CAVITY_BLOCKS];
@@ -90,7 +96,7 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
     p->upper = morph_alloc((size_t)n + (size_t)rows, sizeof *p->upper);
     if (!p->lower || !p->upper) return MORPH_ERR_NOMEM;
     const int count = fill_blocks(p, n, blocks);
-    set_bounds(b, moves, p->options->strongest, z, p->lower, p->upper);
+    set_bounds(b, moves, p->options->strongest, rest->z, p->lower, p->upper);
     morph_status status =
         morph_nlp_create(n, z, p->lower, p->upper, blocks, count, message, sizeof message, &nlp);
     if (status != MORPH_OK) morph_log(p->options->control, "placement: %s", message);
@@ -115,17 +121,23 @@ static morph_status solve(program *p, double moves, double *z, morph_nlp_result 
     return status;
 }
 
-/* The shape at rest with all limits of the balance: those that it does not know have the barrier's force. */
-static double *start_point(const morph_balance *b, const morph_rest *rest) {
+/* A point with all limits of the balance: those that it does not know yet, beyond the first `known`, have
+ * the barrier's force. */
+static double *start_point(const morph_balance *b, const double *from, int known) {
     double *z = morph_alloc((size_t)morph_balance_unknowns(b), sizeof *z);
     if (!z) return NULL;
-    memcpy(z, rest->z, (size_t)(morph_balance_lambda(b) + rest->limits.count) * sizeof *z);
-    for (int q = rest->limits.count; q < b->limits.count; q++)
+    memcpy(z, from, (size_t)(morph_balance_lambda(b) + known) * sizeof *z);
+    for (int q = known; q < b->limits.count; q++)
         z[morph_balance_lambda(b) + q] = b->epsilon / fmax(1e-3, morph_balance_limit_at(b, q, z));
     return z;
 }
 
 enum { PASSES = 3 }; /* of adding limits that a solve went through */
+
+/* Two rows for one pair of axes made programs that nothing solved: forces of thousands of weights between
+ * the rows. What sliding hides stays below what the blanket's end tells from the program's shape (0.02 to
+ * 0.05 spacings), and the blanket judges. */
+#define SLID (-0.01)
 
 morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
                                      const morph_placement_options *options, double moves,
@@ -140,14 +152,21 @@ morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
     }
     morph_status status = morph_cavity_objective_create(w, options, rest->z, b->centres,
                                                         morph_balance_strength(b), &p.objective);
+    int known = rest->limits.count;
     for (int added = 1, pass = 0; added > 0 && pass < PASSES && status == MORPH_OK; pass++) {
         morph_nlp_result_free(result);
+        double *start = start_point(b, *z ? *z : rest->z, known);
         free(*z);
-        *z = start_point(b, rest);
-        status = *z ? solve(&p, moves, *z, result) : MORPH_ERR_NOMEM;
+        *z = start;
+        known = b->limits.count;
+        status = *z ? solve(&p, moves, rest, *z, result) : MORPH_ERR_NOMEM;
         if (status != MORPH_OK) break;
         iterations += result->iterations;
-        status = morph_balance_more_limits(b, *z, &morph_rest_missed, &added);
+        /* What is not solved says too little about which limits are missing to be solved once more. */
+        morph_log(options->control, "placement: program %d: %s, %d iterations, %d limits, %d unknowns",
+                  pass + 1, result->solver_text, result->iterations, b->limits.count, result->unknowns);
+        if (result->outcome != MORPH_OPTIMAL) break;
+        status = morph_balance_more_limits(b, *z, &morph_rest_missed, SLID, &added);
         if (status == MORPH_OK && pass == PASSES - 1) b->limits.count -= added;
     }
     result->iterations = iterations;

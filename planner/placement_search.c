@@ -76,7 +76,7 @@ static void unknowns_of(const morph_balance *b, const double *z, double *p) {
 static morph_status widen(morph_balance *b, const double *z, const morph_nearness *nearness) {
     morph_limits *l = &b->limits;
     const int before = l->count;
-    const morph_status status = morph_balance_more_limits(b, z, nearness, NULL);
+    const morph_status status = morph_balance_more_limits(b, z, nearness, 0.0, NULL);
     if (status != MORPH_OK) return status;
     int kept = before;
     for (int q = before; q < l->count; q++) {

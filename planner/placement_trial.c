@@ -130,6 +130,51 @@ static void set_along(const morph_placer *p, const morph_attractor *from, const 
     }
 }
 
+void morph_branch_free(morph_branch *branch) {
+    morph_trajectory_free(&branch->before.guided);
+    morph_trajectory_free(&branch->step.way);
+    *branch = (morph_branch){0};
+}
+
+static morph_status copy_trajectory(const morph_trajectory *t, morph_trajectory *out) {
+    const size_t frames = (size_t)t->frames, all = 3 * (size_t)t->joints * frames;
+    *out = (morph_trajectory){.frames = t->frames, .joints = t->joints};
+    out->time = morph_alloc(frames, sizeof *out->time);
+    out->x = morph_alloc(all, sizeof *out->x);
+    out->lift = morph_alloc(frames, sizeof *out->lift);
+    if (!out->time || !out->x || !out->lift) {
+        morph_trajectory_free(out);
+        return MORPH_ERR_NOMEM;
+    }
+    memcpy(out->time, t->time, frames * sizeof *out->time);
+    memcpy(out->x, t->x, all * sizeof *out->x);
+    memcpy(out->lift, t->lift, frames * sizeof *out->lift);
+    return MORPH_OK;
+}
+
+/* Before the first leap: how the placement stands, and the step, whose frames become the branch's. */
+static morph_status keep_branch(morph_placer *p, morph_trial *step) {
+    morph_branch *b = &p->branch;
+    b->before = *p->out;
+    b->objective = p->objective;
+    const morph_status status = copy_trajectory(&p->out->guided, &b->before.guided);
+    b->step = *step;
+    step->way = (morph_trajectory){0};
+    return status;
+}
+
+morph_status morph_trial_branch(morph_placer *p) {
+    const morph_placement spent = *p->out;
+    *p->out = p->branch.before;
+    p->branch.before.guided = (morph_trajectory){0};
+    p->out->rounds = spent.rounds;
+    p->out->accepted = spent.accepted;
+    p->out->effort = spent.effort;
+    p->objective = p->branch.objective;
+    morph_placer_stand(p, morph_placer_end(p, &p->out->guided));
+    return morph_trial_accept(p, &p->branch.step);
+}
+
 /* The program sees as far as springs say true of friction: what it holds back may slide on. */
 morph_status morph_trial_along(morph_placer *p, const morph_attractor *from, morph_trial *best) {
     morph_attractor to[MORPH_MOST_CENTRES];
@@ -150,9 +195,11 @@ morph_status morph_trial_along(morph_placer *p, const morph_attractor *from, mor
                   morph_placer_objective(p, &t.measure));
         again = farther && t.measure.objective < (1.0 - WORTH) * best->measure.objective;
         if (t.measure.objective < best->measure.objective) {
+            if (farther && !p->leapt) status = keep_branch(p, best);
             morph_trajectory_free(&best->way);
             *best = t;
             p->leapt |= farther;
+            if (status != MORPH_OK) break;
         } else {
             morph_trajectory_free(&t.way);
         }

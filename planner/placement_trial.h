@@ -5,22 +5,6 @@
 
 #include "planner/placement_rounds.h"
 
-/* Borrows all it points to. */
-typedef struct morph_placer {
-    const morph_workspace *w;
-    const morph_scene *scene;
-    const morph_placement_options *options;
-    morph_placement *out;
-    double unit;        /* a joint's weight, N */
-    double reach;       /* of the next round, spacings */
-    bool bold;          /* the blanket is asked along a program's way too */
-    bool leapt;         /* and was better farther along it */
-    double *x, *scaled; /* 3*joints: where the blanket rests, m, and in spacings */
-    double objective;   /* there, spacings^4 */
-    morph_control quiet;
-    double started; /* morph_seconds() */
-} morph_placer;
-
 /* The blanket run under `centres` centres (metres, N m2), and what was measured where it ends. */
 typedef struct morph_trial {
     int centres;
@@ -31,6 +15,31 @@ typedef struct morph_trial {
      * objective, spacings^4. */
     double difference, predicted;
 } morph_trial;
+
+/* A program's own step that was not taken, as the blanket was better farther along it. */
+typedef struct morph_branch {
+    morph_placement before; /* as it stood, with its own frames */
+    double objective;       /* there, spacings^4 */
+    morph_trial step;
+} morph_branch;
+void morph_branch_free(morph_branch *branch);
+
+/* Borrows all it points to but what the branch holds. */
+typedef struct morph_placer {
+    const morph_workspace *w;
+    const morph_scene *scene;
+    const morph_placement_options *options;
+    morph_placement *out;
+    double unit;         /* a joint's weight, N */
+    double reach;        /* of the next round, spacings */
+    bool bold;           /* the blanket is asked along a program's way too */
+    bool leapt;          /* and was better farther along it */
+    morph_branch branch; /* where that was first so */
+    double *x, *scaled;  /* 3*joints: where the blanket rests, m, and in spacings */
+    double objective;    /* there, spacings^4 */
+    morph_control quiet;
+    double started; /* morph_seconds() */
+} morph_placer;
 
 bool morph_placer_late(const morph_placer *p);
 /* Of the options' time, what is left, s; 0: no limit. */
@@ -55,6 +64,9 @@ morph_status morph_trial_judge(morph_placer *p, const morph_balance *b, const do
 morph_status morph_trial_along(morph_placer *p, const morph_attractor *from, morph_trial *best);
 /* Takes a trial's centres over; its way goes on from the placement's. */
 morph_status morph_trial_accept(morph_placer *p, morph_trial *t);
+/* Back to the branch, and on by the step that was not taken there; what was spent since counts. What stands
+ * now must be put by before. */
+morph_status morph_trial_branch(morph_placer *p);
 /* The placement's centres from the start, at other strengths too: takes over what is better, in place of the
  * way on which they were found. */
 morph_status morph_trial_afresh(morph_placer *p);

@@ -256,7 +256,7 @@ morph_status morph_rest_follow(morph_balance *b, const morph_attractor *centre, 
         status = begin(&f, b, centre, z, known) ? MORPH_OK : MORPH_ERR_NOMEM;
         if (status == MORPH_OK) status = newton(&f, control, effort, &solved);
         if (status == MORPH_OK && solved)
-            status = morph_balance_more_limits(b, f.z, &morph_rest_missed, &added);
+            status = morph_balance_more_limits(b, f.z, &morph_rest_missed, 0.0, &added);
         if (status == MORPH_OK && solved && added == 0) {
             out->z = f.z;
             f.z = NULL;

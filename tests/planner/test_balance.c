@@ -199,8 +199,52 @@ static void planted_sign_is_caught(void **state) {
     }
 }
 
+static int limits_of_pair(const morph_balance *b, const int joint[4]) {
+    int count = 0;
+    for (int q = 0; q < b->limits.count; q++)
+        count += memcmp(b->limits.element[q].joint, joint, 4 * sizeof *joint) == 0;
+    return count;
+}
+
+/* The closest points of two axes slide where one is turned: the pair is known, unless the axes have come
+ * deeper into one another than what sliding may hide. */
+static void slid_pairs(void **state) {
+    fixture *f = *state;
+    const morph_structure *s = f->structure;
+    const morph_nearness self = {-1e9, -1e9, -1e9, 0.05};
+    const double apart = 2.0 * s->def.radius / s->spacing;
+    const int *p = s->link[0];
+    int other = 1;
+    while (s->link[other][0] == p[0] || s->link[other][0] == p[1] || s->link[other][1] == p[0] ||
+           s->link[other][1] == p[1])
+        other++;
+    const int *q = s->link[other];
+    for (int j = 0; j < s->joints; j++)
+        for (int k = 0; k < 3; k++)
+            f->z[3 * j + k] = 10.0 * pow(j + 1.0, k + 1.0);
+    const double near = apart - 1e-3, deep = apart - 0.03;
+    const double first[4][3] = {{-1, 0, 0}, {1, 0, 0}, {0.2, -1, near}, {0.2, 1, near}};
+    const double turned[4][3] = {{-1, 0, 0}, {1, 0, 0}, {0.3, -1, near}, {0.5, 1, near}};
+    const double deeper[4][3] = {{-1, 0, 0}, {1, 0, 0}, {0.3, -1, deep}, {0.5, 1, deep}};
+    const double(*const pose[3])[3] = {first, turned, deeper};
+    const int joint[4] = {p[0], p[1], q[0], q[1]}, wanted[3][2] = {{0, 0}, {1, 0}, {1, 1}};
+    for (int m = 0; m < 3; m++)
+        for (int hides = 0; hides < 2; hides++) {
+            for (int i = 0; i < 4; i++)
+                memcpy(&f->z[3 * joint[i]], first[i], sizeof first[i]);
+            assert_int_equal(morph_balance_limits(f->balance, f->z, &self), MORPH_OK);
+            assert_int_equal(limits_of_pair(f->balance, joint), 1);
+            for (int i = 0; i < 4; i++)
+                memcpy(&f->z[3 * joint[i]], pose[m][i], sizeof first[i]);
+            assert_int_equal(morph_balance_more_limits(f->balance, f->z, &self, hides ? -0.01 : 0.0, NULL),
+                             MORPH_OK);
+            assert_int_equal(limits_of_pair(f->balance, joint), 1 + wanted[m][hides]);
+        }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(slid_pairs, setup, teardown),
         cmocka_unit_test_setup_teardown(without_contact, setup, teardown),
         cmocka_unit_test_setup_teardown(at_contacts, setup, teardown),
         cmocka_unit_test_setup_teardown(every_kind, setup, teardown),
