@@ -5,8 +5,9 @@
 #include <string.h>
 
 /* At rest: for REST_WINDOW sqrt(spacing / gravity), the time a joint takes to fall half a spacing four times
- * over, no joint leaves a ball of REST_SPEED sqrt(gravity spacing) times that, 2e-2 spacings: far below the
- * gaps (0.1 spacings and more) that the end pose is judged by. A contact's trembling in place is no motion.
+ * over, no joint and no vertex of a deformable target leaves a ball of REST_SPEED sqrt(gravity spacing) times
+ * that, 2e-2 spacings: far below the gaps (0.1 spacings and more) that the end pose is judged by. A contact's
+ * trembling in place is no motion.
  */
 #define REST_SPEED 5e-3
 #define REST_WINDOW 4.0
@@ -361,6 +362,15 @@ static bool driven(const morph_blanket_state *b) {
     return false;
 }
 
+static void rest_here(morph_blanket_state *b) {
+    memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
+    if (b->soft) morph_blanket_soft_rest_here(b);
+}
+
+static double from_rest(const morph_blanket_state *b) {
+    return fmax(farthest(b, b->rest_x), b->soft ? morph_blanket_soft_from_rest(b) : 0.0);
+}
+
 static morph_status run(morph_blanket_state *b, int frames, const morph_control *control, morph_trajectory *t,
                         morph_blanket_report *report) {
     const morph_structure *s = b->structure;
@@ -370,7 +380,7 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
     int steps = steps_per_frame(s, &b->def);
     b->good_step = good_step(s, &b->def);
     double calm = 0.0;
-    memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
+    rest_here(b);
     if (b->def.drive) morph_blanket_schedule(b);
     morph_blanket_polish(b, b->x);
     morph_blanket_accelerations(b);
@@ -383,10 +393,8 @@ static morph_status run(morph_blanket_state *b, int frames, const morph_control 
         if (status != MORPH_OK) return status;
         morph_progress(control, b->def.drive ? "replay" : "nominal", (double)t->frames / frames);
         calm += b->def.frame;
-        /* A deformable target must be slow too; the blanket may tremble in place. */
-        const bool soft_moves = b->soft && morph_blanket_soft_frame_move(b) > speed * b->def.frame;
-        if (driven(b) || soft_moves || farthest(b, b->rest_x) > speed * window) {
-            memcpy(b->rest_x, b->x, 3 * (size_t)b->joints * sizeof(double));
+        if (driven(b) || from_rest(b) > speed * window) {
+            rest_here(b);
             calm = 0.0;
         }
         report->at_rest = calm > 0.0 && calm >= window;

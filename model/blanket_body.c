@@ -11,13 +11,20 @@
 #define CONTACT_MARGIN 1e-3 /* spacings */
 /* A frame of more substeps of the body than this would take minutes: beyond it a run is not meant. */
 #define MOST_SUBSTEPS 1e6
+/* Part of the last step's forces that contacts go on pushing with: as with a rigid target (blanket_force.c,
+ * WARM). Corners tremble with none and, where contacts change places, with all. */
+#define CARRIED 0.7
 
 struct morph_blanket_soft {
     morph_body *body; /* the caller's */
     morph_body_contacts *contacts;
-    morph_hold *hold; /* by source: what a contact's corrections came to in the last step, kg m */
+    /* By source, what contacts held with in the step before; the forces are pushed with all through the
+     * coming step, kg m. */
+    morph_hold *hold;
+    double *push, step; /* 3 * vertices: of the body, N; s: of the step before */
     int sources;
     double *keep; /* 12 * vertices: x, v, start, predicted as the frame started */
+    double *rest; /* 3 * vertices: where the ball of rest has its middle */
     double base;  /* height of the body's base plane in the target's place */
     bool holding; /* a frame is being polished */
     morph_distance *surface;
@@ -103,6 +110,10 @@ morph_status morph_blanket_soft_create(morph_blanket_state *b) {
     morph_status status = soft->keep ? create_contacts(b, soft) : MORPH_ERR_NOMEM;
     if (status == MORPH_OK && !(soft->hold = morph_alloc((size_t)soft->sources, sizeof *soft->hold)))
         status = MORPH_ERR_NOMEM;
+    if (status == MORPH_OK && !(soft->push = morph_alloc((size_t)body->vertices, 3 * sizeof *soft->push)))
+        status = MORPH_ERR_NOMEM;
+    if (status == MORPH_OK && !(soft->rest = morph_alloc((size_t)body->vertices, 3 * sizeof *soft->rest)))
+        status = MORPH_ERR_NOMEM;
     if (status == MORPH_OK) lift_body(soft, morph_blanket_lift(&b->def, 0.0));
     return status;
 }
@@ -112,6 +123,8 @@ void morph_blanket_soft_destroy(morph_blanket_soft *soft) {
     morph_body_contacts_destroy(soft->contacts);
     morph_distance_destroy(soft->surface);
     free(soft->hold);
+    free(soft->push);
+    free(soft->rest);
     free(soft->keep);
     free(soft);
 }
@@ -128,6 +141,34 @@ static double whole_energy(const morph_body *body) {
     return kinetic + spring + height;
 }
 
+/* The contacts of the step before push on: a light vertex swings several times within a step, and would leap
+ * off and be set back in every one if contact were only there at its end. What it gets the joints get the
+ * other way. No more than `most`, kg m, as for other contacts (morph_blanket_project_start). */
+void morph_blanket_soft_push(morph_blanket_state *b, double most) {
+    morph_blanket_soft *soft = b->soft;
+    const morph_structure *s = b->structure;
+    const int n = morph_body_contacts_count(soft->contacts);
+    const morph_body_touch *touch = morph_body_contacts_list(soft->contacts);
+    const double h = b->step, force = 1.0 / (h * h), ratio = soft->step > 0.0 ? h / soft->step : 0.0;
+    memset(soft->push, 0, 3 * (size_t)soft->body->vertices * sizeof *soft->push);
+    for (int k = 0; k < n; k++) {
+        const morph_body_touch *t = &touch[k];
+        morph_hold *hold = &soft->hold[t->source];
+        if (hold->push == 0.0) continue;
+        const double carry = CARRIED * ratio * ratio, part = fmin(carry, most / hold->push);
+        hold->push *= part;
+        for (int i = 0; i < 3; i++) {
+            hold->drag[i] *= part;
+            const double change = hold->push * t->normal[i] + hold->drag[i];
+            for (int j = 0; j < 3; j++) {
+                b->v[3 * t->joint[j] + i] += t->weight[j] * b->weight[t->joint[j]] / s->def.mass * change / h;
+                soft->push[3 * t->vertex[j] + i] -= t->body_weight[j] * force * change;
+            }
+        }
+    }
+    soft->step = h;
+}
+
 /* Pinned vertices and the plane below move with the lift; what the body's energy gains by that is work from
  * outside. */
 bool morph_blanket_soft_step(morph_blanket_state *b) {
@@ -139,7 +180,7 @@ bool morph_blanket_soft_step(morph_blanket_state *b) {
     for (int i = 0; i < body->vertices && moves; i++)
         if (body->inverse[i] == 0.0) body->v[3 * i + 2] = rise / b->step;
     if (moves) body->def.base = soft->base + b->lift_to;
-    if (!morph_body_step(body, b->step, NULL)) return false;
+    if (!morph_body_step(body, b->step, soft->push)) return false;
     /* Drag is not for what the lift carries. */
     for (int i = 0; i < body->vertices && moves; i++)
         if (body->inverse[i] == 0.0)
@@ -171,19 +212,16 @@ void morph_blanket_soft_find(morph_blanket_state *b, const double *x, double nea
     if (status == MORPH_ERR_NOMEM) soft->status = status;
 }
 
-void morph_blanket_soft_start(morph_blanket_state *b, double *x, double warm, double most) {
+/* What the contacts already pushed with they may take back. */
+void morph_blanket_soft_start(morph_blanket_state *b) {
     morph_blanket_soft *soft = b->soft;
     if (soft->holding) return;
     const int n = morph_body_contacts_count(soft->contacts);
-    const morph_body_touch *touch = morph_body_contacts_list(soft->contacts);
+    morph_body_touch *touch = morph_body_contacts_list(soft->contacts);
     for (int k = 0; k < n; k++) {
         const morph_hold *hold = &soft->hold[touch[k].source];
-        if (hold->push == 0.0) continue;
-        double drag[3];
-        for (int i = 0; i < 3; i++)
-            drag[i] = warm * hold->drag[i];
-        morph_body_contact_start(soft->contacts, k, fmin(warm * hold->push, most * b->structure->def.mass),
-                                 drag, x, soft->body, b->def.friction);
+        touch[k].push = hold->push;
+        memcpy(touch[k].drag, hold->drag, sizeof hold->drag);
     }
 }
 
@@ -277,12 +315,23 @@ void morph_blanket_soft_stop(morph_blanket_state *b) {
     memset(b->soft->body->v, 0, 3 * (size_t)b->soft->body->vertices * sizeof(double));
 }
 
-double morph_blanket_soft_frame_move(const morph_blanket_state *b) {
-    const morph_body *body = b->soft->body;
+static double farthest(const morph_body *body, const double *from) {
     double most = 0.0;
     for (int i = 0; i < body->vertices; i++)
-        most = fmax(most, morph_dist(&body->x[3 * i], &b->soft->keep[3 * i]));
+        most = fmax(most, morph_dist(&body->x[3 * i], &from[3 * i]));
     return most;
+}
+
+double morph_blanket_soft_frame_move(const morph_blanket_state *b) {
+    return farthest(b->soft->body, b->soft->keep);
+}
+
+void morph_blanket_soft_rest_here(morph_blanket_state *b) {
+    memcpy(b->soft->rest, b->soft->body->x, 3 * (size_t)b->soft->body->vertices * sizeof(double));
+}
+
+double morph_blanket_soft_from_rest(const morph_blanket_state *b) {
+    return farthest(b->soft->body, b->soft->rest);
 }
 
 /* ---- energy ---- */

@@ -396,7 +396,7 @@ void morph_blanket_start_contacts(morph_blanket_state *b, double *x, double warm
         set_drag(c, want, b->def.friction, change);
         move_corners(c, x, change);
     }
-    if (b->soft && warm > 0.0) morph_blanket_soft_start(b, x, warm, most);
+    if (b->soft && warm > 0.0) morph_blanket_soft_start(b);
 }
 
 void morph_blanket_keep_contacts(morph_blanket_state *b) {

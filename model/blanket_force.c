@@ -203,6 +203,7 @@ static void take_velocity(morph_blanket_state *b) {
 static bool drift(morph_blanket_state *b) {
     const size_t bytes = 3 * (size_t)b->joints * sizeof(double);
     memcpy(b->before, b->x, bytes);
+    if (b->soft) morph_blanket_soft_push(b, morph_blanket_most_carried(b) * b->structure->def.mass);
     double fastest = 0.0;
     for (int k = 0; k < 3 * b->joints; k++) {
         b->x[k] += b->step * b->v[k];

@@ -256,6 +256,8 @@ void morph_blanket_list_limits(morph_blanket_state *b, const double *x, bool all
 /* Applies `warm` times the corrections of the last step to x (0: forgets them): at rest every step needs the
  * same ones, so that a few sweeps a step converge over many steps. */
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm);
+/* Largest correction that a step starts from, m. */
+double morph_blanket_most_carried(const morph_blanket_state *b);
 /* Sweep number `sweep` over angles, lengths, contacts and posts of x, odd ones in reversed order. The first
  * and every sixth after it are complete, and those after a sweep that moved more than what counts as nearly;
  * the others look only at what the last complete one found at work or nearly so: four of five listed rows
@@ -375,13 +377,17 @@ void morph_blanket_guard_contacts(morph_blanket_state *b);
 /* blanket_body.c: the deformable target. All but create and destroy need b->soft. */
 morph_status morph_blanket_soft_create(morph_blanket_state *b); /* does nothing without def.body */
 void morph_blanket_soft_destroy(morph_blanket_soft *soft);      /* NULL allowed; the body stays */
+/* Before a step: what held in the last goes on pushing, joints at once, the body through its step. most: kg
+ * m.
+ */
+void morph_blanket_soft_push(morph_blanket_state *b, double most);
 /* Moves the body on by a step, its foot with the target's lift. False where it cannot be kept finite. */
 bool morph_blanket_soft_step(morph_blanket_state *b);
 /* After the sweeps: what contact moved becomes the body's velocity. */
 void morph_blanket_soft_moved(morph_blanket_state *b);
 /* Parts of the functions for rigid contact of the same names. near: how far contacts are listed, m. */
 void morph_blanket_soft_find(morph_blanket_state *b, const double *x, double near);
-void morph_blanket_soft_start(morph_blanket_state *b, double *x, double warm, double most);
+void morph_blanket_soft_start(morph_blanket_state *b);
 void morph_blanket_soft_renew(morph_blanket_state *b);
 void morph_blanket_soft_sweep(morph_blanket_state *b, double *x, bool backward, double friction);
 void morph_blanket_soft_keep(morph_blanket_state *b);
@@ -396,6 +402,9 @@ void morph_blanket_soft_rewind_frame(morph_blanket_state *b);
 void morph_blanket_soft_stop(morph_blanket_state *b); /* takes its speed away */
 /* Longest motion of a vertex since the frame's start, m. */
 double morph_blanket_soft_frame_move(const morph_blanket_state *b);
+void morph_blanket_soft_rest_here(morph_blanket_state *b);
+/* Longest way of a vertex from where it was when that was last called, m. */
+double morph_blanket_soft_from_rest(const morph_blanket_state *b);
 /* Added to what is there, J; any may be NULL. */
 void morph_blanket_soft_energies(const morph_blanket_state *b, double *kinetic, double *spring,
                                  double *height);

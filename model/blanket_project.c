@@ -403,8 +403,12 @@ static void start_angle(morph_turn *t, const morph_angle *a, double *x, double w
 /* What carries weight moves joints by a few times its acceleration times step^2 every step. An impact's
  * corrections are far larger and must not come again in the next step: they would feed the motion. Posts come
  * last: their corrections are not kept, and contacts must not answer before they have. */
+double morph_blanket_most_carried(const morph_blanket_state *b) {
+    return MOST_CARRIED * b->pull * b->step * b->step;
+}
+
 void morph_blanket_project_start(morph_blanket_state *b, double *x, double warm) {
-    const double most = MOST_CARRIED * b->pull * b->step * b->step;
+    const double most = morph_blanket_most_carried(b);
     for (int t = 0; t < b->near_angles; t++)
         start_angle(&b->turn[b->near_angle[t]], &b->angle[b->near_angle[t]], x, warm, most);
     for (int l = 0; l < b->near_links; l++)

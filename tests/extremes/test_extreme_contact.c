@@ -128,8 +128,8 @@ static void test_small_plate(void **state) {
     }
 }
 
-/* A triangle smaller than the sheet has edges without any thickness. Thrown at them at a hundred metres a
- * second and more, the sheet may still be cut: then the report says by how much, and most are held. */
+/* A triangle smaller than the sheet has edges without any thickness. The sheet thrown at them at a hundred
+ * metres a second and more is held, and the report says how well. */
 static void test_knife(void **state) {
     (void)state;
     static const double sizes[] = {0.2, 0.1, 0.06, 0.04}, speeds[] = {100.0, 300.0, 1000.0};
