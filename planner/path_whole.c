@@ -151,7 +151,7 @@ enum { MOST_UNKNOWNS = 6200 };
 
 /* Iterations of all solves of a path together, and of one: most converge in 25, the second from where the
  * first ended in fewer. */
-enum { ALL_ITERATIONS = 100, MOST_ITERATIONS = 60 };
+enum { ALL_ITERATIONS = 80, MOST_ITERATIONS = 60 };
 
 /* Solves in a row that take in rows which the one before broke, and passes that take in poses. */
 enum { ROUNDS = 4, PASSES = 3 };
@@ -283,8 +283,9 @@ static morph_status build(mover *m) {
 
 /* Examines the poses between the ends exactly and takes in the rows that they stand near or break. */
 static morph_status examine(mover *m, bool *hold) {
-    /* As of a projection (planner/project.c). */
-    const morph_nearness near = {.length = 0.1, .angle = 0.15, .clearance = 0.15, .self = 0.1};
+    /* As of a projection (planner/project.c), but for angles: those turn the most, and with 0.15 one in two
+     * first solves breaks an angle that it had no row for. */
+    const morph_nearness near = {.length = 0.1, .angle = 0.3, .clearance = 0.15, .self = 0.1};
     morph_pather *p = m->p;
     morph_status status = MORPH_OK;
     *hold = true;
@@ -447,7 +448,7 @@ static morph_status draw_poses(morph_pather *p, const morph_curve *curve) {
     const size_t width = (size_t)p->coordinates;
     double *scratch = morph_alloc((size_t)morph_pose_width(st), sizeof *scratch);
     if (!scratch) return MORPH_ERR_NOMEM;
-    memcpy(pose(p, INTERVALS), pose(p, p->count - 1), width * sizeof *p->x);
+    memmove(pose(p, INTERVALS), pose(p, p->count - 1), width * sizeof *p->x);
     p->count = INTERVALS + 1;
     for (int k = 0; k < p->count; k++) {
         p->s[k] = k == 0 ? 0.0 : k == INTERVALS ? 1.0 : parameter(p, k);
