@@ -139,7 +139,7 @@ enum { INTERVALS = 8 };
 
 /* Poses stand so much closer than evenly at an end that touches its limits (there by 1 - CLOSER, away from it
  * by 1 + CLOSER): the room that poses leave for the curve between them goes to nothing there. */
-static const double CLOSER = 0.5;
+static const double CLOSER = 0.65;
 
 /* Weights beside L' / rate. SECOND: s; of 0 to 1 the durations over a box, a saddle and a step changed by 6 %
  * in all, least here. BEND: a third of it leaves folds between poses, three times as much costs 5 %. */
