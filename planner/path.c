@@ -1,8 +1,8 @@
 /* Poses are taken from the guide at even progress and bent towards the end pose; each is moved the least that
  * its limits (with an inset) ask; a spline goes through them; where it breaks a limit between poses, a pose
  * is inserted and the spline drawn anew. */
-#include "planner/path.h"
-#include "planner/project.h"
+#include "planner/path_parts.h"
+#include "planner/path_whole.h"
 #include "solvers/dense.h"
 
 #include <stdlib.h>
@@ -16,27 +16,11 @@ morph_path_options morph_path_defaults(void) {
                                 .fine = 12,
                                 .sweeps = 1,
                                 .smoothness = 30.0,
-                                .refine = true};
+                                .refine = true,
+                                .whole = true};
 }
 
-typedef struct pather {
-    const morph_world *world; /* here */
-    morph_world here;         /* the world with the target where it stands at the pose in hand */
-    const morph_path_options *options;
-    morph_path_report *report;
-    int coordinates, count, capacity;
-    double *s;      /* capacity: parameter */
-    double *x;      /* capacity x coordinates, scaled */
-    double *inset;  /* capacity: extra factor on the inset of a pose */
-    double *metres; /* capacity x coordinates */
-    double *lift;   /* capacity: the target above its place, m */
-    bool rises;
-    bool end_breaks; /* a limit: no pose inserted before it helps */
-    morph_active *active;
-    double started;
-} pather;
-
-static double *pose(pather *p, int k) {
+static double *pose(morph_pather *p, int k) {
     return &p->x[(size_t)k * (size_t)p->coordinates];
 }
 
@@ -61,7 +45,7 @@ static int frame_at(const morph_trajectory *guide, int n, double fraction) {
     return guide->frames - 1;
 }
 
-static void set_guided_poses(pather *p, const morph_trajectory *guide, const double *start,
+static void set_guided_poses(morph_pather *p, const morph_trajectory *guide, const double *start,
                              const double *end) {
     const int n = p->coordinates;
     const double a = p->world->structure->spacing;
@@ -91,7 +75,7 @@ static void set_guided_poses(pather *p, const morph_trajectory *guide, const dou
 
 /* The guide's poses bent to the first station, then the stations themselves: each within reach of the one
  * before and inside its limits. */
-static void set_stations(pather *p, const morph_trajectory *guide, const double *start) {
+static void set_stations(morph_pather *p, const morph_trajectory *guide, const double *start) {
     const double a = p->world->structure->spacing;
     const size_t width = (size_t)p->coordinates;
     const int stations = p->options->stations;
@@ -106,7 +90,7 @@ static void set_stations(pather *p, const morph_trajectory *guide, const double 
 
 /* Full inset away from the end, down to the end's own over the last quarter of the way; and from a bent
  * start, which stands as near to its limits as the end that it was. */
-static morph_inset inset_at(const pather *p, double s, double factor) {
+morph_inset morph_path_inset(const morph_pather *p, double s, double factor) {
     const double near = p->options->bent ? fmin(s, 1.0 - s) : 1.0 - s;
     const double f = factor * fmin(1.0, near / 0.25);
     const morph_inset *e = &p->options->end, *i = &p->options->interior;
@@ -118,14 +102,14 @@ static morph_inset inset_at(const pather *p, double s, double factor) {
  * killed the next by then too. */
 enum { MOST_DEATHS = 3 };
 
-static void stand_target(pather *p, double lift) {
+static void stand_target(morph_pather *p, double lift) {
     p->here.lift = lift;
 }
 
 /* Moves pose k the least from where it stands so that it holds its limits with its inset. A solver that dies
  * leaves the pose as it was: the curve's examination decides whether that matters. */
-static morph_status solve_pose(pather *p, int k) {
-    const morph_inset inset = inset_at(p, p->s[k], p->inset[k]);
+static morph_status solve_pose(morph_pather *p, int k) {
+    const morph_inset inset = morph_path_inset(p, p->s[k], p->inset[k]);
     const size_t width = (size_t)p->coordinates;
     morph_violation v;
     double *before = morph_alloc(width, sizeof *before);
@@ -143,7 +127,7 @@ static morph_status solve_pose(pather *p, int k) {
 }
 
 /* Parameter by chord length, so that the spline sees even speed. */
-static void set_parameters(pather *p) {
+static void set_parameters(morph_pather *p) {
     p->s[0] = 0.0;
     for (int k = 1; k < p->count; k++)
         p->s[k] = p->s[k - 1] + 1e-6 + rms(pose(p, k), pose(p, k - 1), p->coordinates);
@@ -152,7 +136,7 @@ static void set_parameters(pather *p) {
     p->s[p->count - 1] = 1.0;
 }
 
-static morph_status draw_curve(pather *p, morph_curve **out) {
+static morph_status draw_curve(morph_pather *p, morph_curve **out) {
     const double a = p->world->structure->spacing;
     const size_t all = (size_t)p->count * (size_t)p->coordinates;
     for (size_t i = 0; i < all; i++)
@@ -172,7 +156,7 @@ typedef struct breach {
 } breach;
 
 /* Whether the end itself breaks a limit, where the target stands then. */
-static morph_status examine_end(pather *p) {
+static morph_status examine_end(morph_pather *p) {
     morph_violation v;
     stand_target(p, p->lift[p->count - 1]);
     const morph_status status =
@@ -182,7 +166,7 @@ static morph_status examine_end(pather *p) {
 }
 
 /* Examines the curve between poses: the worst breach of every interval, and the worst violation of all. */
-static morph_status examine_curve(pather *p, const morph_curve *curve, breach *breaches) {
+static morph_status examine_curve(morph_pather *p, const morph_curve *curve, breach *breaches) {
     const morph_structure *st = p->world->structure;
     double *scratch = morph_alloc((size_t)morph_pose_width(st), sizeof(double));
     double *x = morph_alloc((size_t)p->coordinates, sizeof(double));
@@ -216,7 +200,7 @@ static morph_status examine_curve(pather *p, const morph_curve *curve, breach *b
     return status;
 }
 
-static bool make_room(pather *p) {
+static bool make_room(morph_pather *p) {
     if (p->count < p->capacity) return true;
     const int next = 2 * p->capacity;
     const size_t rows = (size_t)next, width = (size_t)p->coordinates;
@@ -236,7 +220,7 @@ static bool make_room(pather *p) {
 }
 
 /* A pose between k and k + 1, taken from the curve at s and moved inside its limits. */
-static morph_status insert_pose(pather *p, const morph_curve *curve, int k, double s) {
+static morph_status insert_pose(morph_pather *p, const morph_curve *curve, int k, double s) {
     if (!make_room(p)) return MORPH_ERR_NOMEM;
     const size_t width = (size_t)p->coordinates, after = (size_t)(p->count - k - 1);
     memmove(&p->s[k + 2], &p->s[k + 1], after * sizeof *p->s);
@@ -259,7 +243,8 @@ static morph_status insert_pose(pather *p, const morph_curve *curve, int k, doub
 
 /* Inserts a pose into every interval that breaks a limit; false in *changed when nothing could be inserted.
  */
-static morph_status mend(pather *p, const morph_curve *curve, const breach *breaches, bool *changed) {
+static morph_status insert_poses(morph_pather *p, const morph_curve *curve, const breach *breaches,
+                                 bool *changed) {
     *changed = false;
     const int before = p->count;
     for (int k = before - 2; k >= 0; k--) {
@@ -276,13 +261,13 @@ static morph_status mend(pather *p, const morph_curve *curve, const breach *brea
     return MORPH_OK;
 }
 
-static bool out_of_time(const pather *p) {
+bool morph_path_out_of_time(const morph_pather *p) {
     return morph_stopped(p->options->control) ||
            (p->options->seconds > 0.0 && morph_seconds() - p->started > p->options->seconds);
 }
 
 /* Held joints stand where they start: exactly, not as the sums and solves that moved them leave them. */
-static void hold_fixed(pather *p) {
+static void hold_fixed(morph_pather *p) {
     const morph_structure *st = p->world->structure;
     for (int k = 1; k < p->count; k++)
         for (int f = 0; f < st->fixed_joints; f++) {
@@ -293,7 +278,7 @@ static void hold_fixed(pather *p) {
 
 /* Smooths the poses between the ends: min sum |y - x|^2 + weight sum |second differences|^2, coordinate by
  * coordinate one banded system; poses keep their places in the row, so even progress stays even. */
-static morph_status smooth_poses(pather *p, double weight) {
+static morph_status smooth_poses(morph_pather *p, double weight) {
     const int n = p->count - 2, width = p->coordinates;
     double *matrix = morph_alloc((size_t)n, (size_t)n * sizeof(double));
     double *right = morph_alloc((size_t)n, (size_t)width * sizeof(double));
@@ -330,7 +315,7 @@ static morph_status smooth_poses(pather *p, double weight) {
 /* Poses from the end back to the start: each a step along the straight way from the pose after it to the
  * start, moved inside its limits. Every step begins at a pose that holds, so this finds a way where the
  * guide's poses, bent to the end, are too far from one. */
-static morph_status unfold_poses(pather *p) {
+static morph_status unfold_poses(morph_pather *p) {
     morph_status status = MORPH_OK;
     for (int k = p->count - 2; k > 0 && status == MORPH_OK; k--) {
         const double *from = pose(p, k + 1), *start = pose(p, 0);
@@ -346,7 +331,7 @@ static morph_status unfold_poses(pather *p) {
 }
 
 /* Poses by turns smoothed and moved inside their limits: both hold nearly at the end, the limits exactly. */
-static morph_status settle_poses(pather *p) {
+static morph_status settle_poses(morph_pather *p) {
     morph_status status = MORPH_OK;
     for (int sweep = 0; sweep < p->options->sweeps && status == MORPH_OK; sweep++) {
         status = smooth_poses(p, p->options->smoothness);
@@ -361,14 +346,8 @@ static morph_status settle_poses(pather *p) {
     return status;
 }
 
-static morph_status run(pather *p, morph_curve **curve) {
+morph_status morph_path_mend(morph_pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
-    hold_fixed(p);
-    set_parameters(p);
-    if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
-    if (!p->options->refine && p->options->smooth) status = smooth_poses(p, p->options->smoothness);
-    if (status == MORPH_OK) set_parameters(p);
-    if (status == MORPH_OK) status = examine_end(p);
     double before = INFINITY;
     for (int round = 0; round < 12 && status == MORPH_OK; round++) {
         breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
@@ -386,11 +365,25 @@ static morph_status run(pather *p, morph_curve **curve) {
         bool changed = false;
         p->report->feasible = status == MORPH_OK && worst <= 1.0;
         if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !p->end_breaks &&
-            !out_of_time(p))
-            status = mend(p, *curve, breaches, &changed);
+            !morph_path_out_of_time(p))
+            status = insert_poses(p, *curve, breaches, &changed);
         free(breaches);
         if (!changed) break;
     }
+    return status;
+}
+
+static morph_status run(morph_pather *p, morph_curve **curve) {
+    morph_status status = MORPH_OK;
+    hold_fixed(p);
+    set_parameters(p);
+    if (p->options->refine) status = p->options->unfold ? unfold_poses(p) : settle_poses(p);
+    if (!p->options->refine && p->options->smooth) status = smooth_poses(p, p->options->smoothness);
+    if (status == MORPH_OK) set_parameters(p);
+    if (status == MORPH_OK) status = examine_end(p);
+    if (status == MORPH_OK) status = morph_path_mend(p, curve);
+    if (status == MORPH_OK && p->options->refine && p->options->whole && p->report->feasible)
+        status = morph_path_whole(p, curve);
     return status;
 }
 
@@ -399,12 +392,12 @@ morph_status morph_path_plan(const morph_world *world, const morph_trajectory *g
                              morph_path_report *report) {
     *out = NULL;
     *report = (morph_path_report){.rows_possible = morph_possible_rows(world->structure)};
-    pather p = {.here = *world,
-                .options = options,
-                .report = report,
-                .coordinates = 3 * world->structure->joints,
-                .capacity = options->intervals + options->stations + 8,
-                .started = morph_seconds()};
+    morph_pather p = {.here = *world,
+                      .options = options,
+                      .report = report,
+                      .coordinates = 3 * world->structure->joints,
+                      .capacity = options->intervals + options->stations + 8,
+                      .started = morph_seconds()};
     p.world = &p.here;
     const size_t rows = (size_t)p.capacity, width = (size_t)p.coordinates;
     p.s = morph_alloc(rows, sizeof(double));

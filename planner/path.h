@@ -24,12 +24,16 @@ typedef struct morph_path_options {
     bool bent;             /* the start is a shape of its own, not where the guide begins */
     bool in_place;         /* at the end the target stands in its place, wherever the guide left it */
     bool smooth;           /* with refine false: smoothed, which takes no solve either */
+    bool whole;            /* a path that holds is moved as a whole, and kept where its schedule is shorter */
     const morph_control *control;
 } morph_path_options;
 morph_path_options morph_path_defaults(void);
 
 typedef struct morph_path_report {
     int poses, inserted, rows_possible;
+    bool moved; /* as a whole */
+    double before,
+        after;  /* durations of the path found and of the one moved as a whole, s; 0: not looked at */
     int deaths; /* solves of poses that ended without a result: the poses stayed as they were */
     morph_effort effort;
     double seconds;

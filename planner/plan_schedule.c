@@ -121,6 +121,7 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
     if (!solve && p->options->method == MORPH_METHOD_IPOPT) o.fine = 2; /* only to choose what to trim */
     o.smooth = p->options->method == MORPH_METHOD_IPOPT;
     o.unfold = unfold;
+    o.whole = solve && !p->stopped && !morph_planner_drafts(p); /* drafts and what a stop leaves are cheap */
     if (stations && p->refined.stations > 0) {
         o.stations = p->refined.stations;
         o.station = p->refined.station;

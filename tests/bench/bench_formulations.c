@@ -154,6 +154,7 @@ static morph_status product(const morph_planner *p, outcome *o) {
     for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK; k++) {
         morph_path_options path = morph_path_defaults();
         morph_path_report r;
+        path.whole = false; /* that is what it is compared with */
         path.unfold = ways[k].unfold;
         path.intervals = ways[k].intervals;
         if (ways[k].stations && p->refined.stations > 0) {

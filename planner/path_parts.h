@@ -1,0 +1,35 @@
+/* Inside the path: what path.c and path_whole.c share. Not for others. */
+#ifndef MORPH_PATH_PARTS_H
+#define MORPH_PATH_PARTS_H
+
+#include "planner/path.h"
+
+/* A path in the making: its poses with their parameters. */
+typedef struct morph_pather {
+    const morph_world *world; /* here */
+    morph_world here;         /* the world with the target where it stands at the pose in hand */
+    const morph_path_options *options;
+    morph_path_report *report;
+    int coordinates, count, capacity;
+    double *s;      /* capacity: parameter */
+    double *x;      /* capacity x coordinates, scaled */
+    double *inset;  /* capacity: extra factor on the inset of a pose */
+    double *metres; /* capacity x coordinates */
+    double *lift;   /* capacity: the target above its place, m */
+    bool rises;
+    bool end_breaks; /* a limit: no pose inserted before it helps */
+    morph_active *active;
+    double started;
+} morph_pather;
+
+/* The inset of a pose at parameter s with its own factor. */
+morph_inset morph_path_inset(const morph_pather *p, double s, double factor);
+
+/* Whether the caller wants an end, or the seconds are used up. */
+bool morph_path_out_of_time(const morph_pather *p);
+
+/* Draws the curve through the poses, examines it, and inserts poses until it holds its limits or no more of
+ * them help; report->feasible and violation are the last curve's, which is returned in any case. */
+morph_status morph_path_mend(morph_pather *p, morph_curve **curve);
+
+#endif
