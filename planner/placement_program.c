@@ -134,11 +134,6 @@ static double *start_point(const morph_balance *b, const double *from, int known
 
 enum { PASSES = 3 }; /* of adding limits that a solve went through */
 
-/* Two rows for one pair of axes made programs that nothing solved: forces of thousands of weights between
- * the rows. What sliding hides stays below what the blanket's end tells from the program's shape (0.02 to
- * 0.05 spacings), and the blanket judges. */
-#define SLID (-0.01)
-
 morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
                                      const morph_placement_options *options, double moves,
                                      const morph_rest *rest, double **z, morph_nlp_result *result) {
@@ -166,7 +161,7 @@ morph_status morph_placement_program(const morph_workspace *w, morph_balance *b,
         morph_log(options->control, "placement: program %d: %s, %d iterations, %d limits, %d unknowns",
                   pass + 1, result->solver_text, result->iterations, b->limits.count, result->unknowns);
         if (result->outcome != MORPH_OPTIMAL) break;
-        status = morph_balance_more_limits(b, *z, &morph_rest_missed, SLID, &added);
+        status = morph_balance_more_limits(b, *z, &morph_rest_missed, MORPH_REST_SLID, &added);
         if (status == MORPH_OK && pass == PASSES - 1) b->limits.count -= added;
     }
     result->iterations = iterations;

@@ -107,7 +107,8 @@ morph_status morph_rest_solve(morph_balance *b, const morph_attractor *centre, d
 enum { PASSES = 3 }; /* of adding missed limits */
 
 static morph_status find(morph_balance *b, const morph_attractor *centre, double epsilon, const double *x,
-                         const double *tau, int rounds, const morph_control *control, morph_rest *out) {
+                         const double *tau, int rounds, double slid, const morph_control *control,
+                         morph_rest *out) {
     *out = (morph_rest){0};
     const size_t n = (size_t)b->coordinates;
     morph_rest_energy energy = {b, centre};
@@ -129,7 +130,7 @@ static morph_status find(morph_balance *b, const morph_attractor *centre, double
             out->solves++;
             out->iterations += result.iterations;
             out->solved = result.outcome == MORPH_OPTIMAL;
-            status = morph_balance_more_limits(b, result.x, &morph_rest_missed, 0.0, &added);
+            status = morph_balance_more_limits(b, result.x, &morph_rest_missed, slid, &added);
             if (status == MORPH_OK && added > 0 && pass < PASSES - 1) {
                 /* What came in a little is pushed out from where it is; what came in far, from before. */
                 double deepest = 0.0;
@@ -167,15 +168,12 @@ enum { FIND_ROUNDS = 12 };
 
 morph_status morph_rest_find(morph_balance *b, const morph_attractor *centre, double epsilon, const double *x,
                              const double *tau, const morph_control *control, morph_rest *out) {
-    return find(b, centre, epsilon, x, tau, FIND_ROUNDS, control, out);
+    return find(b, centre, epsilon, x, tau, FIND_ROUNDS, 0.0, control, out);
 }
 
 /* Springs this stiff move no joint by more than about a hundredth of a spacing where the blanket's forces are
  * a few weights off balance. */
 #define ADOPT_HOLD 100.0
-/* The limits near x are those near the shape too: the springs let it go nowhere. Rounds of listing them anew
- * went on for as long as two sets of limits took turns. */
-enum { ADOPT_ROUNDS = 2 };
 
 morph_status morph_rest_adopt(morph_balance *b, const morph_attractor *centre, double epsilon,
                               const double *x, const morph_control *control, morph_rest *out) {
@@ -184,7 +182,9 @@ morph_status morph_rest_adopt(morph_balance *b, const morph_attractor *centre, d
     b->hold = ADOPT_HOLD;
     memset(b->force, 0, n * sizeof *b->force);
     memcpy(b->anchor, x, n * sizeof *x);
-    const morph_status status = find(b, centre, epsilon, x, NULL, ADOPT_ROUNDS, control, out);
+    /* One round: the limits near x are those near the shape too, as the springs let it go nowhere. Rounds of
+     * listing them anew went on for as long as two sets of limits took turns. */
+    const morph_status status = find(b, centre, epsilon, x, NULL, 1, MORPH_REST_SLID, control, out);
     b->hold = hold;
     if (status != MORPH_OK) return status;
     for (size_t i = 0; i < n; i++)

@@ -12,6 +12,11 @@ extern const morph_nearness morph_rest_nearness;
  */
 extern const morph_nearness morph_rest_missed;
 #define MORPH_REST_REACH 0.4
+/* Of a pair of axes that has a limit already, more than this is a further limit for the program and where a
+ * blanket is adopted. Two rows for one pair made programs that nothing solved: forces of thousands of weights
+ * between the rows. What sliding hides stays below what the blanket's end tells from the program's shape
+ * (0.02 to 0.05 spacings), and the blanket judges. */
+#define MORPH_REST_SLID (-0.01)
 
 /* A point of balance. Owned: morph_rest_free. */
 typedef struct morph_rest {
