@@ -152,9 +152,15 @@ static const double SECOND = 0.2, BEND = 0.01;
  * 12 x 12, which have 6048: with 50 iterations as long as the refinement took there. */
 enum { MOST_UNKNOWNS = 6200 };
 
-/* Iterations of all solves of a path together, and of one: most converge in 25, the second from where the
- * first ended in fewer. */
-enum { ALL_ITERATIONS = 80, MOST_ITERATIONS = 60 };
+/* Iterations of all solves of a path together, at 8 x 8 nodes; of one at most three quarters of them: most
+ * converge in 25, the second from where the first ended in fewer. Elsewhere as many more or fewer as they are
+ * cheaper or dearer: paths of small structures around large targets take a hundred and more. */
+enum { ITERATIONS = 80, ITERATIONS_UNKNOWNS = 2688, FEWEST_ITERATIONS = 40, MOST_ITERATIONS = 200 };
+
+static int all_iterations(const morph_pather *p) {
+    const int all = ITERATIONS * ITERATIONS_UNKNOWNS / ((INTERVALS - 1) * p->coordinates);
+    return all < FEWEST_ITERATIONS ? FEWEST_ITERATIONS : all < MOST_ITERATIONS ? all : MOST_ITERATIONS;
+}
 
 /* Solves in a row that take in rows which the one before broke, and passes that take in poses. */
 enum { ROUNDS = 4, PASSES = 3 };
@@ -169,7 +175,7 @@ typedef struct mover {
     morph_pather *p;
     morph_control quiet;
     int poses;             /* that there were at create */
-    int *left;             /* iterations */
+    int *left, most;       /* iterations: of all solves, of one */
     double *reference;     /* the poses as they were: the box stands about them */
     double *lower, *upper; /* of all coordinates of all poses */
     int *index;            /* of all coordinates: a block's own begin where its first pose does */
@@ -195,7 +201,7 @@ static void mover_free(mover *m) {
 
 static morph_status mover_create(morph_pather *p, int *left, mover *m) {
     const size_t count = (size_t)p->count, all = count * (size_t)p->coordinates;
-    *m = (mover){.p = p, .poses = p->count, .left = left};
+    *m = (mover){.p = p, .poses = p->count, .left = left, .most = all_iterations(p) * 3 / 4};
     if (p->options->control) m->quiet = *p->options->control;
     m->quiet.log = NULL;
     m->quiet.progress = NULL;
@@ -324,7 +330,7 @@ static morph_status solve(mover *m, bool *solved) {
     morph_nlp_result r = {0};
     morph_nlp_options o = morph_nlp_defaults();
     o.tolerance = 1e-3; /* the objective is some tenths per link: durations then repeat to a thousandth */
-    o.max_iterations = *m->left < MOST_ITERATIONS ? *m->left : MOST_ITERATIONS;
+    o.max_iterations = *m->left < m->most ? *m->left : m->most;
     o.isolated = true;
     o.adaptive_mu = false;
     o.mu_init = 1e-3; /* it starts inside its limits */
@@ -474,7 +480,7 @@ static morph_status draw_poses(morph_pather *p, const morph_curve *curve) {
  * in *best. */
 static morph_status improve(morph_pather *p, kept *best) {
     morph_status status = draw_poses(p, best->curve);
-    int left = ALL_ITERATIONS;
+    int left = all_iterations(p);
     for (int pass = 0; pass < PASSES && status == MORPH_OK && left > 0; pass++) {
         morph_curve *curve = NULL;
         double duration = INFINITY;

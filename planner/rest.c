@@ -117,7 +117,9 @@ static morph_status find(morph_balance *b, const morph_attractor *centre, double
     if (status == MORPH_OK) {
         memcpy(at, x, n * sizeof *at);
     }
-    bool bounded = true;
+    /* Bounds keep a search near its limits; their barrier is a force, so the last round has none, and the one
+     * of an adoption, whose springs do as much. */
+    bool bounded = rounds > 1;
     for (int round = 0; round < rounds && status == MORPH_OK; round++) {
         double moved = 0.0;
         status = morph_balance_limits(b, at, &morph_rest_nearness);
