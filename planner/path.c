@@ -219,8 +219,8 @@ static bool make_room(morph_pather *p) {
     return true;
 }
 
-/* A pose between k and k + 1, taken from the curve at s and moved inside its limits. */
-static morph_status insert_pose(morph_pather *p, const morph_curve *curve, int k, double s) {
+/* A pose between k and k + 1, taken from the curve at s; moved inside its limits if so wanted. */
+static morph_status insert_pose(morph_pather *p, const morph_curve *curve, int k, double s, bool solve) {
     if (!make_room(p)) return MORPH_ERR_NOMEM;
     const size_t width = (size_t)p->coordinates, after = (size_t)(p->count - k - 1);
     memmove(&p->s[k + 2], &p->s[k + 1], after * sizeof *p->s);
@@ -238,13 +238,13 @@ static morph_status insert_pose(morph_pather *p, const morph_curve *curve, int k
     for (int i = 0; i < p->coordinates; i++)
         pose(p, k + 1)[i] /= p->world->structure->spacing;
     p->report->inserted++;
-    return solve_pose(p, k + 1);
+    return solve ? solve_pose(p, k + 1) : MORPH_OK;
 }
 
 /* Inserts a pose into every interval that breaks a limit; false in *changed when nothing could be inserted.
  */
 static morph_status insert_poses(morph_pather *p, const morph_curve *curve, const breach *breaches,
-                                 bool *changed) {
+                                 bool solve, bool *changed) {
     *changed = false;
     const int before = p->count;
     for (int k = before - 2; k >= 0; k--) {
@@ -254,7 +254,7 @@ static morph_status insert_poses(morph_pather *p, const morph_curve *curve, cons
         if (gap < 2e-3) continue;
         /* Halves keep neighbouring intervals alike, without which a quintic swings. */
         const double s = p->s[k] + 0.5 * gap;
-        const morph_status status = insert_pose(p, curve, k, s);
+        const morph_status status = insert_pose(p, curve, k, s, solve);
         if (status != MORPH_OK) return status;
         *changed = true;
     }
@@ -346,31 +346,92 @@ static morph_status settle_poses(morph_pather *p) {
     return status;
 }
 
+/* Draws the curve and examines it: breaches (count of poses) and what the report says of it. */
+static morph_status look(morph_pather *p, morph_curve **curve, breach *breaches, double *worst,
+                         morph_limit *which) {
+    morph_path_report *r = p->report;
+    morph_status status = draw_curve(p, curve);
+    if (status == MORPH_OK) status = examine_curve(p, *curve, breaches);
+    *which = MORPH_LIMIT_POST;
+    *worst = morph_violation_worst(&r->violation, morph_pose_tolerance, which);
+    r->feasible = status == MORPH_OK && *worst <= 1.0;
+    morph_log(p->options->control, "path: %d poses: worst %s %.3g at %.3f (%s)", p->count,
+              morph_limit_name(*which), r->violation.amount[*which], r->where[*which],
+              r->violation.element[*which]);
+    return status;
+}
+
+/* Twice the inset of the poses about every interval that breaks a limit. */
+static bool step_back(morph_pather *p, const breach *breaches) {
+    bool any = false;
+    double *before = p->inset;
+    for (int k = 0; k + 1 < p->count; k++) {
+        if (breaches[k].worst <= 1.0) continue;
+        for (int m = k; m <= k + 1; m++)
+            if (m > 0 && m + 1 < p->count && before[m] < 2.0) before[m] = 2.0, any = true;
+    }
+    return any;
+}
+
+morph_status morph_path_give_room(morph_pather *p, morph_curve **curve, bool poses, bool *more) {
+    double worst;
+    morph_limit which;
+    *more = false;
+    breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
+    if (!breaches) return MORPH_ERR_NOMEM;
+    morph_status status = look(p, curve, breaches, &worst, &which);
+    if (status == MORPH_OK && !p->report->feasible) {
+        if (!poses) *more = step_back(p, breaches);
+        if (!*more) status = insert_poses(p, *curve, breaches, false, more);
+    }
+    free(breaches);
+    return status;
+}
+
+/* One round of mending: false in *more when the curve holds, or no more poses would help. */
+static morph_status mend_once(morph_pather *p, morph_curve **curve, morph_kept *best, double *least,
+                              bool first, bool *more) {
+    *more = false;
+    breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
+    if (!breaches) return MORPH_ERR_NOMEM;
+    morph_path_report *r = p->report;
+    double worst;
+    morph_limit which;
+    morph_status status = look(p, curve, breaches, &worst, &which);
+    /* More poses that do not bring it closer are no use. */
+    const bool hopeless = !first && worst > 0.9 * *least && r->violation.amount[which] > 0.05;
+    if (status == MORPH_OK && !r->feasible && (first || worst < *least))
+        status = morph_keep(p, curve, INFINITY, best);
+    *least = worst;
+    if (status == MORPH_OK && !r->feasible && p->options->refine && !hopeless && !p->end_breaks &&
+        !morph_path_out_of_time(p))
+        status = insert_poses(p, *curve ? *curve : best->curve, breaches, true, more);
+    free(breaches);
+    return status;
+}
+
 morph_status morph_path_mend(morph_pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
-    double before = INFINITY;
-    for (int round = 0; round < 12 && status == MORPH_OK; round++) {
-        breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
-        if (!breaches) return MORPH_ERR_NOMEM;
-        status = draw_curve(p, curve);
-        if (status == MORPH_OK) status = examine_curve(p, *curve, breaches);
-        morph_limit which = MORPH_LIMIT_POST;
-        const double worst = morph_violation_worst(&p->report->violation, morph_pose_tolerance, &which);
-        morph_log(p->options->control, "path: %d poses: worst %s %.3g at %.3f (%s)", p->count,
-                  morph_limit_name(which), p->report->violation.amount[which], p->report->where[which],
-                  p->report->violation.element[which]);
-        /* More poses that do not bring it closer are no use. */
-        const bool hopeless = round > 0 && worst > 0.9 * before && p->report->violation.amount[which] > 0.05;
-        before = worst;
-        bool changed = false;
-        p->report->feasible = status == MORPH_OK && worst <= 1.0;
-        if (status == MORPH_OK && !p->report->feasible && p->options->refine && !hopeless && !p->end_breaks &&
-            !morph_path_out_of_time(p))
-            status = insert_poses(p, *curve, breaches, &changed);
-        free(breaches);
-        if (!changed) break;
-    }
+    morph_kept best = {0};
+    double least = INFINITY;
+    bool more = true;
+    for (int round = 0; round < 12 && status == MORPH_OK && more; round++)
+        status = mend_once(p, curve, &best, &least, round == 0, &more);
+    if (best.curve && !p->report->feasible) morph_put_back(&best, p, curve);
+    morph_kept_free(&best);
     return status;
+}
+
+/* Poses that hold, with a curve between them that breaks limits by less than this (spacings, rad), may be
+ * near a path that holds: moved as a whole it loses what folds it has. A curve further off swings. */
+static const double near_enough = 0.3;
+
+static bool worth_moving(const morph_pather *p) {
+    if (!p->options->refine || !p->options->whole || p->end_breaks) return false;
+    if (!p->options->nearly) return p->report->feasible;
+    for (int l = 0; l < MORPH_LIMITS; l++)
+        if (p->report->violation.amount[l] > near_enough) return false;
+    return true;
 }
 
 static morph_status run(morph_pather *p, morph_curve **curve) {
@@ -382,8 +443,7 @@ static morph_status run(morph_pather *p, morph_curve **curve) {
     if (status == MORPH_OK) set_parameters(p);
     if (status == MORPH_OK) status = examine_end(p);
     if (status == MORPH_OK) status = morph_path_mend(p, curve);
-    if (status == MORPH_OK && p->options->refine && p->options->whole && p->report->feasible)
-        status = morph_path_whole(p, curve);
+    if (status == MORPH_OK && worth_moving(p)) status = morph_path_whole(p, curve);
     return status;
 }
 

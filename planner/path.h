@@ -25,16 +25,17 @@ typedef struct morph_path_options {
     bool in_place;         /* at the end the target stands in its place, wherever the guide left it */
     bool smooth;           /* with refine false: smoothed, which takes no solve either */
     bool whole;            /* a path that holds is moved as a whole, and kept where its schedule is shorter */
+    bool nearly;           /* with whole: so is one that nearly holds, in case it then does */
     const morph_control *control;
 } morph_path_options;
 morph_path_options morph_path_defaults(void);
 
 typedef struct morph_path_report {
     int poses, inserted, rows_possible;
-    bool moved; /* as a whole */
-    double before,
-        after;  /* durations of the path found and of the one moved as a whole, s; 0: not looked at */
-    int deaths; /* solves of poses that ended without a result: the poses stayed as they were */
+    bool moved;           /* as a whole */
+    double before, after; /* durations of the path found and of the one moved as a whole, s; 0: not looked at,
+                           * or it does not hold */
+    int deaths;           /* solves of poses that ended without a result: the poses stayed as they were */
     morph_effort effort;
     double seconds;
     bool feasible;              /* on the fine grid, by exact examination */

@@ -1,4 +1,4 @@
-/* Inside the path: what path.c and path_whole.c share. Not for others. */
+/* Inside the path: what path.c, path_kept.c and path_whole.c share. Not for others. */
 #ifndef MORPH_PATH_PARTS_H
 #define MORPH_PATH_PARTS_H
 
@@ -31,5 +31,29 @@ bool morph_path_out_of_time(const morph_pather *p);
 /* Draws the curve through the poses, examines it, and inserts poses until it holds its limits or no more of
  * them help; report->feasible and violation are the last curve's, which is returned in any case. */
 morph_status morph_path_mend(morph_pather *p, morph_curve **curve);
+
+/* Draws the curve through the poses and examines it. Wherever it breaks a limit between two poses, these are
+ * to keep twice their distance from limits; with poses, or where they are to already, a pose of the curve
+ * itself comes between them. *more: the poses are to be moved anew. */
+morph_status morph_path_give_room(morph_pather *p, morph_curve **curve, bool poses, bool *more);
+
+/* A path put aside: its poses, its curve and what there is to say of it. */
+typedef struct morph_kept {
+    int count;
+    double *s, *x, *inset, *lift; /* owned */
+    morph_curve *curve;           /* owned */
+    double duration;
+    bool feasible;
+    morph_violation violation;
+    double where[MORPH_LIMITS];
+} morph_kept;
+void morph_kept_free(morph_kept *k); /* empty after it */
+
+/* Takes the curve over, and the place of what was put aside before. MORPH_ERR_NOMEM: both stay. */
+morph_status morph_keep(const morph_pather *p, morph_curve **curve, double duration, morph_kept *k);
+
+/* The path in hand is again the one that was put aside; its curve takes the place of *curve. There is room: a
+ * path in the making never shrinks its memory. */
+void morph_put_back(morph_kept *k, morph_pather *p, morph_curve **curve);
 
 #endif

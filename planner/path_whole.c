@@ -148,18 +148,19 @@ static const double CLOSER = 0.6;
  * third of it leaves folds between poses there, three times as much costs 5 %. */
 static const double SECOND = 0.2, BEND = 0.01;
 
-/* Free unknowns that it is tried with. An iteration takes 0.02 s at 4 x 4 nodes, 0.2 s at 8 x 8 and 1 s at
- * 12 x 12, which have 6048: with 50 iterations as long as the refinement took there. */
-enum { MOST_UNKNOWNS = 6200 };
+/* Free unknowns that it is tried with: 24 x 24 nodes. An iteration takes 0.02 s at 4 x 4 nodes, 0.15 s at
+ * 8 x 8, 0.6 s at 12 x 12 and 1.4 s at 16 x 16. */
+enum { MOST_UNKNOWNS = 26000 };
 
-/* Iterations of all solves of a path together, at 8 x 8 nodes; of one at most three quarters of them: most
- * converge in 25, the second from where the first ended in fewer. Elsewhere as many more or fewer as they are
- * cheaper or dearer: paths of small structures around large targets take a hundred and more. */
-enum { ITERATIONS = 80, ITERATIONS_UNKNOWNS = 2688, FEWEST_ITERATIONS = 40, MOST_ITERATIONS = 200 };
+/* Iterations of all solves of a path together; of one at most three quarters of them. The first converges in
+ * 25 at 8 x 8 nodes and in 60 at 16 x 16, a second, with the rows that it broke, in 40, a third in 20. Below
+ * 8 x 8 more in proportion, for they are cheap: paths of small structures around large targets take a hundred
+ * and more. */
+enum { ITERATIONS = 130, ITERATIONS_UNKNOWNS = 2688, MOST_ITERATIONS = 200 };
 
 static int all_iterations(const morph_pather *p) {
     const int all = ITERATIONS * ITERATIONS_UNKNOWNS / ((INTERVALS - 1) * p->coordinates);
-    return all < FEWEST_ITERATIONS ? FEWEST_ITERATIONS : all < MOST_ITERATIONS ? all : MOST_ITERATIONS;
+    return all < ITERATIONS ? ITERATIONS : all < MOST_ITERATIONS ? all : MOST_ITERATIONS;
 }
 
 /* Solves in a row that take in rows which the one before broke, and passes that take in poses. */
@@ -332,6 +333,7 @@ static morph_status solve(mover *m, bool *solved) {
     o.tolerance = 1e-3; /* the objective is some tenths per link: durations then repeat to a thousandth */
     o.max_iterations = *m->left < m->most ? *m->left : m->most;
     o.isolated = true;
+    o.dissect = true;
     o.adaptive_mu = false;
     o.mu_init = 1e-3; /* it starts inside its limits */
     o.control = &m->quiet;
@@ -362,71 +364,6 @@ static morph_status move(morph_pather *p, int *left) {
     }
     mover_free(&m);
     return status;
-}
-
-/* A path put aside: its poses, its curve and what there is to say of it. */
-typedef struct kept {
-    int count;
-    double *s, *x, *inset, *lift;
-    morph_curve *curve; /* owned */
-    double duration;
-    bool feasible;
-    morph_violation violation;
-    double where[MORPH_LIMITS];
-} kept;
-
-static void kept_free(kept *k) {
-    free(k->s);
-    free(k->x);
-    free(k->inset);
-    free(k->lift);
-    morph_curve_destroy(k->curve);
-    *k = (kept){0};
-}
-
-static double *copy(const double *from, size_t count) {
-    double *to = morph_alloc(count, sizeof *to);
-    if (to) memcpy(to, from, count * sizeof *to);
-    return to;
-}
-
-/* Takes the curve over, and the place of what was put aside before. MORPH_ERR_NOMEM: both stay. */
-static morph_status keep(const morph_pather *p, morph_curve **curve, double duration, kept *k) {
-    const size_t count = (size_t)p->count;
-    kept next = {.count = p->count,
-                 .s = copy(p->s, count),
-                 .x = copy(p->x, count * (size_t)p->coordinates),
-                 .inset = copy(p->inset, count),
-                 .lift = copy(p->lift, count),
-                 .duration = duration,
-                 .feasible = p->report->feasible,
-                 .violation = p->report->violation};
-    if (!next.s || !next.x || !next.inset || !next.lift) {
-        kept_free(&next);
-        return MORPH_ERR_NOMEM;
-    }
-    memcpy(next.where, p->report->where, sizeof next.where);
-    next.curve = *curve;
-    *curve = NULL;
-    kept_free(k);
-    *k = next;
-    return MORPH_OK;
-}
-
-/* The path in hand is again the one that was put aside; its curve goes to *curve. There is room: a path in
- * the making never shrinks its memory. */
-static void put_back(kept *k, morph_pather *p, morph_curve **curve) {
-    const size_t count = (size_t)k->count;
-    p->count = k->count;
-    memcpy(p->s, k->s, count * sizeof *p->s);
-    memcpy(p->x, k->x, count * (size_t)p->coordinates * sizeof *p->x);
-    memcpy(p->inset, k->inset, count * sizeof *p->inset);
-    memcpy(p->lift, k->lift, count * sizeof *p->lift);
-    p->report->feasible = k->feasible;
-    p->report->violation = k->violation;
-    memcpy(p->report->where, k->where, sizeof k->where);
-    *curve = k->curve;
-    k->curve = NULL;
 }
 
 static morph_status duration_of(const morph_pather *p, const morph_curve *curve, double *out) {
@@ -476,49 +413,60 @@ static morph_status draw_poses(morph_pather *p, const morph_curve *curve) {
     return MORPH_OK;
 }
 
-/* Moves the path, mends it, and moves it again with the poses that the mending put in; the best that holds is
- * in *best. */
-static morph_status improve(morph_pather *p, kept *best) {
+/* Moves the path, and moves it again with a pose more wherever the curve between them breaks a limit; the
+ * last time it is mended, pose by pose. The best that holds is in *best. */
+static morph_status improve(morph_pather *p, morph_kept *best) {
     morph_status status = draw_poses(p, best->curve);
     int left = all_iterations(p);
-    for (int pass = 0; pass < PASSES && status == MORPH_OK && left > 0; pass++) {
+    bool more = true;
+    for (int pass = 0; pass < PASSES && status == MORPH_OK && more && left > 0; pass++) {
         morph_curve *curve = NULL;
         double duration = INFINITY;
+        more = false;
         morph_progress(p->options->control, "path", 0.8 + 0.2 * pass / PASSES);
         status = move(p, &left);
         if (status != MORPH_OK || morph_path_out_of_time(p)) break;
-        const int poses = p->count;
-        status = morph_path_mend(p, &curve);
+        status = left > 0 && pass + 1 < PASSES ? morph_path_give_room(p, &curve, pass > 0, &more)
+                                               : morph_path_mend(p, &curve);
         if (status == MORPH_OK && p->report->feasible) status = duration_of(p, curve, &duration);
         if (status == MORPH_OK && duration < best->duration) {
-            status = keep(p, &curve, duration, best);
+            status = morph_keep(p, &curve, duration, best);
             p->report->moved = true;
         }
         morph_curve_destroy(curve);
-        if (p->count == poses || morph_path_out_of_time(p)) break;
+        if (morph_path_out_of_time(p)) break;
     }
     return status;
 }
 
+static void say(const morph_pather *p) {
+    const morph_path_report *r = p->report;
+    if (r->before > 0.0)
+        morph_log(p->options->control, "path: whole: %.3f s before, %.3f s after", r->before, r->after);
+    else
+        morph_log(p->options->control, "path: whole: now it %s",
+                  r->after > 0.0 ? "holds" : "does not hold either");
+}
+
 morph_status morph_path_whole(morph_pather *p, morph_curve **curve) {
     morph_path_report *report = p->report;
-    kept best = {0};
-    double before, alone;
+    morph_kept best = {0};
+    double before = INFINITY, alone = 0.0;
     int link;
     if ((INTERVALS - 1) * p->coordinates > MOST_UNKNOWNS || morph_path_out_of_time(p)) return MORPH_OK;
-    morph_status status = duration_of(p, *curve, &before);
+    morph_status status = report->feasible ? duration_of(p, *curve, &before) : MORPH_OK;
     if (status == MORPH_OK) status = morph_timing_single_link(*curve, &alone, &link);
-    if (status == MORPH_OK && before > near_bound * alone) status = keep(p, curve, before, &best);
+    if (status == MORPH_OK && before > near_bound * alone) status = morph_keep(p, curve, before, &best);
     if (status == MORPH_OK && best.curve) {
-        report->before = before;
+        report->before = isfinite(before) ? before : 0.0;
         /* What has no result leaves the best before it. */
         status = improve(p, &best);
         if (status == MORPH_ERR_BACKEND || status == MORPH_ERR_NOMEM) report->deaths++;
-        report->after = best.duration;
-        morph_log(p->options->control, "path: whole: %.3f s before, %.3f s after", before, best.duration);
-        put_back(&best, p, curve);
+        report->after = isfinite(best.duration) ? best.duration : 0.0;
+        say(p);
+        morph_put_back(&best, p, curve);
     }
-    kept_free(&best);
+    morph_kept_free(&best);
     /* The path that there was is whole without this step. */
     return MORPH_OK;
 }

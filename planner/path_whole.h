@@ -30,11 +30,12 @@ typedef struct morph_bend_term {
 } morph_bend_term;
 morph_block morph_block_bend(morph_bend_term *data, const int *unknown);
 
-/* Moves all poses between the ends of a path that holds (p, drawn as *curve) by one program over all of them,
- * draws and examines anew, inserts poses where that is needed. What comes out is kept if it holds its limits
- * and its schedule is shorter; else poses, parameters, curve and what the report says of them stay as they
- * were: so too after a stop, without time, where memory is refused and where a solver died (report->deaths).
- * A path of more unknowns than can be solved for is left. Always MORPH_OK: there was a path before it. */
+/* Moves all poses between the ends of a path (p, drawn as *curve) by one program over all of them, draws and
+ * examines anew, gives the curve room where it breaks limits. What comes out is kept if it holds its limits
+ * and the path did not, or its schedule is shorter; else poses, parameters, curve and what the report says of
+ * them stay as they were: so too after a stop, without time, where memory is refused and where a solver died
+ * (report->deaths). A path of more unknowns than can be solved for is left. Always MORPH_OK: there was a path
+ * before it. */
 morph_status morph_path_whole(morph_pather *p, morph_curve **curve);
 
 #endif

@@ -112,22 +112,27 @@ morph_status morph_stage_project(morph_planner *p) {
     return status;
 }
 
+typedef struct way {
+    bool unfold, stations, nearly; /* as of morph_path_options; stations: through those of the refinement */
+    int intervals;
+} way;
+
 /* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
-static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool stations, int intervals,
-                             double *least) {
+static morph_status try_path(morph_planner *p, bool solve, way w, double *least) {
     morph_path_options o = morph_path_defaults();
     o.control = morph_planner_control(p);
     o.refine = solve;
     if (!solve && p->options->method == MORPH_METHOD_IPOPT) o.fine = 2; /* only to choose what to trim */
     o.smooth = p->options->method == MORPH_METHOD_IPOPT;
-    o.unfold = unfold;
+    o.unfold = w.unfold;
+    o.nearly = w.nearly;
     o.whole = solve && !p->stopped && !morph_planner_drafts(p); /* drafts and what a stop leaves are cheap */
-    if (stations && p->refined.stations > 0) {
+    if (w.stations && p->refined.stations > 0) {
         o.stations = p->refined.stations;
         o.station = p->refined.station;
         o.smoothness = 1.0; /* the stations are small steps already: little smoothing keeps them inside */
     }
-    o.intervals = intervals;
+    o.intervals = w.intervals;
     morph_curve *curve = NULL;
     morph_path_report r;
     /* The other methods' ways are the blanket's, which falls from flat. */
@@ -157,9 +162,9 @@ static morph_status try_path(morph_planner *p, bool solve, bool unfold, bool sta
 /* Poses without a solve, the quickest that there is. The pure blanket's way is that of its own. */
 static morph_status plain_path(morph_planner *p, double *least) {
     p->deadline = INFINITY;
-    morph_status status = try_path(p, false, false, false, 24, least);
+    morph_status status = try_path(p, false, (way){.intervals = 24}, least);
     if (status == MORPH_OK && p->refined.stations > 0 && *least > 1.0)
-        status = try_path(p, false, false, true, 24, least);
+        status = try_path(p, false, (way){.stations = true, .intervals = 24}, least);
     return status;
 }
 
@@ -181,15 +186,16 @@ static morph_status trim_path(morph_planner *p) {
     return MORPH_OK;
 }
 
-/* First stepped back from the end; then along the blanket's own way and the poses that the refinement went
- * through; last stepped back in more poses: the first that holds is taken. The pure blanket gets its poses
+/* First stepped back from the end; then so in more poses; then along the blanket's own way and the poses that
+ * the refinement went through; last the first once more, moved as a whole if it nearly holds: the first that
+ * holds is taken. The pure blanket gets its poses
  * without a solve. So does what is left of a path that was cut short, by a stop, a budget or a solver's
  * death: of that, what holds is kept. */
 morph_status morph_stage_path(morph_planner *p) {
-    static const struct {
-        bool unfold, stations;
-        int intervals;
-    } ways[] = {{true, false, 12}, {false, true, 24}, {true, false, 24}};
+    static const way ways[] = {{.unfold = true, .intervals = 12},
+                               {.unfold = true, .intervals = 24},
+                               {.stations = true, .intervals = 24},
+                               {.unfold = true, .intervals = 12, .nearly = true}};
     const double since = morph_seconds();
     const bool solve = p->options->method == MORPH_METHOD_IPOPT;
     double least = INFINITY;
@@ -198,7 +204,7 @@ morph_status morph_stage_path(morph_planner *p) {
     morph_planner_limit(p, MORPH_STAGE_PATH);
     for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK && solve;) {
         const bool before = p->stopped;
-        status = try_path(p, true, ways[k].unfold, ways[k].stations, ways[k].intervals, &least);
+        status = try_path(p, true, ways[k], &least);
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
         status = morph_planner_survive(p, status, MORPH_STAGE_PATH);

@@ -91,6 +91,10 @@ typedef struct morph_nlp_options {
      * max_seconds hold even within one long factorisation. Blocks then run in the child, on copies: what they
      * write to their data is lost; stop, progress and log still run in the caller. */
     bool isolated;
+    /* Order by nested dissection: less fill in programs of many thousand unknowns that hang together in three
+     * dimensions (a grid over the poses of a path). Isolated solves only: the ordering draws random numbers,
+     * which begin anew in each child. */
+    bool dissect;
     const morph_control *control; /* stop is asked once per iteration */
 } morph_nlp_options;
 morph_nlp_options morph_nlp_defaults(void);
