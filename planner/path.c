@@ -390,7 +390,7 @@ morph_status morph_path_give_room(morph_pather *p, morph_curve **curve, bool pos
 
 /* One round of mending: false in *more when the curve holds, or no more poses would help. */
 static morph_status mend_once(morph_pather *p, morph_curve **curve, morph_kept *best, double *least,
-                              bool first, bool *more) {
+                              double *before, bool *more) {
     *more = false;
     breach *breaches = morph_alloc((size_t)p->count, sizeof *breaches);
     if (!breaches) return MORPH_ERR_NOMEM;
@@ -399,10 +399,12 @@ static morph_status mend_once(morph_pather *p, morph_curve **curve, morph_kept *
     morph_limit which;
     morph_status status = look(p, curve, breaches, &worst, &which);
     /* More poses that do not bring it closer are no use. */
-    const bool hopeless = !first && worst > 0.9 * *least && r->violation.amount[which] > 0.05;
-    if (status == MORPH_OK && !r->feasible && (first || worst < *least))
+    const bool hopeless = worst > 0.9 * *before && r->violation.amount[which] > 0.05;
+    *before = worst;
+    if (status == MORPH_OK && !r->feasible && worst < *least) {
         status = morph_keep(p, curve, INFINITY, best);
-    *least = worst;
+        *least = worst;
+    }
     if (status == MORPH_OK && !r->feasible && p->options->refine && !hopeless && !p->end_breaks &&
         !morph_path_out_of_time(p))
         status = insert_poses(p, *curve ? *curve : best->curve, breaches, true, more);
@@ -413,10 +415,10 @@ static morph_status mend_once(morph_pather *p, morph_curve **curve, morph_kept *
 morph_status morph_path_mend(morph_pather *p, morph_curve **curve) {
     morph_status status = MORPH_OK;
     morph_kept best = {0};
-    double least = INFINITY;
+    double least = INFINITY, before = INFINITY;
     bool more = true;
     for (int round = 0; round < 12 && status == MORPH_OK && more; round++)
-        status = mend_once(p, curve, &best, &least, round == 0, &more);
+        status = mend_once(p, curve, &best, &least, &before, &more);
     if (best.curve && !p->report->feasible) morph_put_back(&best, p, curve);
     morph_kept_free(&best);
     return status;
@@ -426,9 +428,8 @@ morph_status morph_path_mend(morph_pather *p, morph_curve **curve) {
  * near a path that holds: moved as a whole it loses what folds it has. A curve further off swings. */
 static const double near_enough = 0.3;
 
-static bool worth_moving(const morph_pather *p) {
-    if (!p->options->refine || !p->options->whole || p->end_breaks) return false;
-    if (!p->options->nearly) return p->report->feasible;
+static bool holds_nearly(const morph_pather *p) {
+    if (p->end_breaks || p->report->feasible || !morph_path_whole_fits(p)) return false;
     for (int l = 0; l < MORPH_LIMITS; l++)
         if (p->report->violation.amount[l] > near_enough) return false;
     return true;
@@ -443,7 +444,10 @@ static morph_status run(morph_pather *p, morph_curve **curve) {
     if (status == MORPH_OK) set_parameters(p);
     if (status == MORPH_OK) status = examine_end(p);
     if (status == MORPH_OK) status = morph_path_mend(p, curve);
-    if (status == MORPH_OK && worth_moving(p)) status = morph_path_whole(p, curve);
+    const morph_path_options *o = p->options;
+    const bool worth = p->report->feasible || (o->nearly && holds_nearly(p));
+    if (status == MORPH_OK && o->refine && o->whole && worth) status = morph_path_whole(p, curve);
+    p->report->nearly = status == MORPH_OK && holds_nearly(p);
     return status;
 }
 

@@ -29,7 +29,7 @@ morph_inset morph_path_inset(const morph_pather *p, double s, double factor);
 bool morph_path_out_of_time(const morph_pather *p);
 
 /* Draws the curve through the poses, examines it, and inserts poses until it holds its limits or no more of
- * them help; report->feasible and violation are the last curve's, which is returned in any case. */
+ * them help; the curve that comes nearest is returned with its poses, and the report is of it. */
 morph_status morph_path_mend(morph_pather *p, morph_curve **curve);
 
 /* Draws the curve through the poses and examines it. Wherever it breaks a limit between two poses, these are
@@ -49,7 +49,8 @@ typedef struct morph_kept {
 } morph_kept;
 void morph_kept_free(morph_kept *k); /* empty after it */
 
-/* Takes the curve over, and the place of what was put aside before. MORPH_ERR_NOMEM: both stay. */
+/* Takes the curve over (there may be none), and the place of what was put aside before. MORPH_ERR_NOMEM: both
+ * stay. */
 morph_status morph_keep(const morph_pather *p, morph_curve **curve, double duration, morph_kept *k);
 
 /* The path in hand is again the one that was put aside; its curve takes the place of *curve. There is room: a

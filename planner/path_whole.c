@@ -163,7 +163,7 @@ static int all_iterations(const morph_pather *p) {
     return all < ITERATIONS ? ITERATIONS : all < MOST_ITERATIONS ? all : MOST_ITERATIONS;
 }
 
-/* Solves in a row that take in rows which the one before broke, and passes that take in poses. */
+/* Solves in a row that take in rows which the one before broke, and passes that give the curve room. */
 enum { ROUNDS = 4, PASSES = 3 };
 
 /* Schedules are compared at this sample, s: they agree with those at 1 ms to a thousandth. */
@@ -335,7 +335,7 @@ static morph_status solve(mover *m, bool *solved) {
     o.isolated = true;
     o.dissect = true;
     o.adaptive_mu = false;
-    o.mu_init = 1e-3; /* it starts inside its limits */
+    o.mu_init = 1e-3; /* it starts inside its limits, or near them */
     o.control = &m->quiet;
     if (p->options->seconds > 0.0)
         o.max_seconds = fmax(1e-3, p->options->seconds - (morph_seconds() - p->started));
@@ -413,30 +413,58 @@ static morph_status draw_poses(morph_pather *p, const morph_curve *curve) {
     return MORPH_OK;
 }
 
-/* Moves the path, and moves it again with a pose more wherever the curve between them breaks a limit; the
- * last time it is mended, pose by pose. The best that holds is in *best. */
+/* The curve is the best if it holds and its schedule is the shortest; it is taken over or destroyed. */
+static morph_status consider(morph_pather *p, morph_curve *curve, morph_kept *best) {
+    morph_status status = MORPH_OK;
+    double duration = INFINITY;
+    if (p->report->feasible) status = duration_of(p, curve, &duration);
+    if (status == MORPH_OK && duration < best->duration) {
+        status = morph_keep(p, &curve, duration, best);
+        if (status == MORPH_OK) p->report->moved = true;
+    }
+    morph_curve_destroy(curve);
+    return status;
+}
+
+/* Moves the path, and again where the curve between its poses breaks a limit: with more distance from limits
+ * there, then with more poses; the last time it is mended, pose by pose. Where there was no room for more
+ * distance, the poses as they were before are mended. The best is in *best. */
 static morph_status improve(morph_pather *p, morph_kept *best) {
+    morph_kept first = {0};
     morph_status status = draw_poses(p, best->curve);
     int left = all_iterations(p);
     bool more = true;
     for (int pass = 0; pass < PASSES && status == MORPH_OK && more && left > 0; pass++) {
         morph_curve *curve = NULL;
-        double duration = INFINITY;
         more = false;
         morph_progress(p->options->control, "path", 0.8 + 0.2 * pass / PASSES);
         status = move(p, &left);
         if (status != MORPH_OK || morph_path_out_of_time(p)) break;
-        status = left > 0 && pass + 1 < PASSES ? morph_path_give_room(p, &curve, pass > 0, &more)
-                                               : morph_path_mend(p, &curve);
-        if (status == MORPH_OK && p->report->feasible) status = duration_of(p, curve, &duration);
-        if (status == MORPH_OK && duration < best->duration) {
-            status = morph_keep(p, &curve, duration, best);
-            p->report->moved = true;
-        }
-        morph_curve_destroy(curve);
+        if (pass == 0) status = morph_keep(p, &curve, INFINITY, &first); /* without a curve */
+        if (status == MORPH_OK)
+            status = left > 0 && pass + 1 < PASSES ? morph_path_give_room(p, &curve, pass > 0, &more)
+                                                   : morph_path_mend(p, &curve);
+        if (status == MORPH_OK)
+            status = consider(p, curve, best);
+        else
+            morph_curve_destroy(curve);
         if (morph_path_out_of_time(p)) break;
     }
+    if (status == MORPH_OK && first.count > 0 && !p->report->feasible && !morph_path_out_of_time(p)) {
+        morph_curve *curve = NULL;
+        morph_put_back(&first, p, &curve);
+        status = morph_path_mend(p, &curve);
+        if (status == MORPH_OK)
+            status = consider(p, curve, best);
+        else
+            morph_curve_destroy(curve);
+    }
+    morph_kept_free(&first);
     return status;
+}
+
+bool morph_path_whole_fits(const morph_pather *p) {
+    return (INTERVALS - 1) * p->coordinates <= MOST_UNKNOWNS;
 }
 
 static void say(const morph_pather *p) {
@@ -453,7 +481,7 @@ morph_status morph_path_whole(morph_pather *p, morph_curve **curve) {
     morph_kept best = {0};
     double before = INFINITY, alone = 0.0;
     int link;
-    if ((INTERVALS - 1) * p->coordinates > MOST_UNKNOWNS || morph_path_out_of_time(p)) return MORPH_OK;
+    if (!morph_path_whole_fits(p) || morph_path_out_of_time(p)) return MORPH_OK;
     morph_status status = report->feasible ? duration_of(p, *curve, &before) : MORPH_OK;
     if (status == MORPH_OK) status = morph_timing_single_link(*curve, &alone, &link);
     if (status == MORPH_OK && before > near_bound * alone) status = morph_keep(p, curve, before, &best);

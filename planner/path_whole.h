@@ -30,12 +30,14 @@ typedef struct morph_bend_term {
 } morph_bend_term;
 morph_block morph_block_bend(morph_bend_term *data, const int *unknown);
 
+/* Whether a path of this structure has few enough unknowns to be solved for. */
+bool morph_path_whole_fits(const morph_pather *p);
+
 /* Moves all poses between the ends of a path (p, drawn as *curve) by one program over all of them, draws and
  * examines anew, gives the curve room where it breaks limits. What comes out is kept if it holds its limits
  * and the path did not, or its schedule is shorter; else poses, parameters, curve and what the report says of
  * them stay as they were: so too after a stop, without time, where memory is refused and where a solver died
- * (report->deaths). A path of more unknowns than can be solved for is left. Always MORPH_OK: there was a path
- * before it. */
+ * (report->deaths). A path that does not fit is left. Always MORPH_OK: there was a path before it. */
 morph_status morph_path_whole(morph_pather *p, morph_curve **curve);
 
 #endif

@@ -117,8 +117,15 @@ typedef struct way {
     int intervals;
 } way;
 
+/* Of the ways tried so far, the one whose path is kept. */
+typedef struct kept_way {
+    way way;
+    double worst; /* violation over its tolerance: above 1 it breaks a limit */
+    bool nearly;  /* by little */
+} kept_way;
+
 /* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
-static morph_status try_path(morph_planner *p, bool solve, way w, double *least) {
+static morph_status try_path(morph_planner *p, bool solve, way w, kept_way *kept) {
     morph_path_options o = morph_path_defaults();
     o.control = morph_planner_control(p);
     o.refine = solve;
@@ -146,10 +153,10 @@ static morph_status try_path(morph_planner *p, bool solve, way w, double *least)
     s->callback_seconds += r.effort.callback_seconds;
     const double worst = morph_violation_worst(&r.violation, morph_pose_tolerance, NULL);
     if (r.deaths > 0) morph_planner_survive(p, MORPH_ERR_BACKEND, MORPH_STAGE_PATH);
-    if (status == MORPH_OK && curve && (!p->curve || worst < *least)) {
+    if (status == MORPH_OK && curve && (!p->curve || worst < kept->worst)) {
         morph_curve_destroy(p->curve);
         p->curve = curve;
-        *least = worst;
+        *kept = (kept_way){w, worst, r.nearly};
         s->unknowns_path = r.effort.unknowns;
         s->rows_path_used = r.effort.rows;
         s->rows_path_possible = r.rows_possible;
@@ -160,11 +167,11 @@ static morph_status try_path(morph_planner *p, bool solve, way w, double *least)
 }
 
 /* Poses without a solve, the quickest that there is. The pure blanket's way is that of its own. */
-static morph_status plain_path(morph_planner *p, double *least) {
+static morph_status plain_path(morph_planner *p, kept_way *kept) {
     p->deadline = INFINITY;
-    morph_status status = try_path(p, false, (way){.intervals = 24}, least);
-    if (status == MORPH_OK && p->refined.stations > 0 && *least > 1.0)
-        status = try_path(p, false, (way){.stations = true, .intervals = 24}, least);
+    morph_status status = try_path(p, false, (way){.intervals = 24}, kept);
+    if (status == MORPH_OK && p->refined.stations > 0 && kept->worst > 1.0)
+        status = try_path(p, false, (way){.stations = true, .intervals = 24}, kept);
     return status;
 }
 
@@ -187,31 +194,32 @@ static morph_status trim_path(morph_planner *p) {
 }
 
 /* First stepped back from the end; then so in more poses; then along the blanket's own way and the poses that
- * the refinement went through; last the first once more, moved as a whole if it nearly holds: the first that
- * holds is taken. The pure blanket gets its poses
- * without a solve. So does what is left of a path that was cut short, by a stop, a budget or a solver's
- * death: of that, what holds is kept. */
+ * the refinement went through: the first that holds is taken. Where none does, the one that comes nearest is
+ * moved as a whole, if it is near. The pure blanket gets its poses without a solve. So does what is left of a
+ * path that was cut short, by a stop, a budget or a solver's death: of that, what holds is kept. */
 morph_status morph_stage_path(morph_planner *p) {
     static const way ways[] = {{.unfold = true, .intervals = 12},
                                {.unfold = true, .intervals = 24},
-                               {.stations = true, .intervals = 24},
-                               {.unfold = true, .intervals = 12, .nearly = true}};
+                               {.stations = true, .intervals = 24}};
+    enum { WAYS = sizeof ways / sizeof *ways };
     const double since = morph_seconds();
     const bool solve = p->options->method == MORPH_METHOD_IPOPT;
-    double least = INFINITY;
+    kept_way kept = {.worst = INFINITY};
     morph_status status = MORPH_OK;
     bool cut = p->stopped || morph_planner_drafts(p);
     morph_planner_limit(p, MORPH_STAGE_PATH);
-    for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK && solve;) {
+    for (size_t k = 0; (k < WAYS || (k == WAYS && kept.nearly)) && status == MORPH_OK && solve;) {
         const bool before = p->stopped;
-        status = try_path(p, true, ways[k], &least);
+        way next = k < WAYS ? ways[k] : kept.way;
+        next.nearly = k == WAYS;
+        status = try_path(p, true, next, &kept);
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
         status = morph_planner_survive(p, status, MORPH_STAGE_PATH);
         /* No way leads inside its limits to an end that is not. */
-        if (p->curve && (least <= 1.0 || !p->refined.feasible)) break;
+        if (p->curve && (kept.worst <= 1.0 || !p->refined.feasible)) break;
         cut = cut || p->stopped || p->lost || morph_seconds() > p->deadline;
-        if (!before && p->stopped) {
+        if (!before && p->stopped && k < WAYS) {
             morph_planner_limit(p, MORPH_STAGE_PATH); /* the same way again, in the time that a stop leaves */
             continue;
         }
@@ -222,9 +230,9 @@ morph_status morph_stage_path(morph_planner *p) {
     /* With a plan in hand nothing is patched up for want of time. */
     if (status == MORPH_OK && !p->curve && !p->stopped && p->draft.there && p->draft.summary.feasible)
         status = MORPH_ERR_STOPPED;
-    const bool plain = !p->curve || (solve && cut && least > 1.0 && !p->draft.there);
-    if (status == MORPH_OK && plain) status = plain_path(p, &least);
-    if (status == MORPH_OK && solve && cut && (plain || least > 1.0)) status = trim_path(p);
+    const bool plain = !p->curve || (solve && cut && kept.worst > 1.0 && !p->draft.there);
+    if (status == MORPH_OK && plain) status = plain_path(p, &kept);
+    if (status == MORPH_OK && solve && cut && (plain || kept.worst > 1.0)) status = trim_path(p);
     morph_planner_time(p, MORPH_STAGE_PATH, since);
     return status;
 }

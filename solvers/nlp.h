@@ -93,7 +93,7 @@ typedef struct morph_nlp_options {
     bool isolated;
     /* Order by nested dissection: less fill in programs of many thousand unknowns that hang together in three
      * dimensions (a grid over the poses of a path). Isolated solves only: the ordering draws random numbers,
-     * which begin anew in each child. */
+     * which begin anew in each child, and must not run in threads, which each child is told. */
     bool dissect;
     const morph_control *control; /* stop is asked once per iteration */
 } morph_nlp_options;

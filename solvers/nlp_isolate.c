@@ -8,6 +8,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -65,6 +66,9 @@ static _Noreturn void child(morph_nlp *nlp, const morph_nlp_options *options, mo
         dup2(null, STDOUT_FILENO);
         dup2(null, STDERR_FILENO);
     }
+    /* Several threads of the nested dissection race for their parts, and the ordering is another each time.
+     */
+    setenv("SCOTCH_PTHREAD_NUMBER", "1", 1);
     child_link link = {run, pipe};
     const morph_control control = {child_stop, child_progress, child_log, &link};
     morph_nlp_options o = *options;

@@ -55,7 +55,7 @@ static const char usage_text[] =
  * it would be mapped and cleared each time, a tenth of all time at 4 x 4 nodes. */
 static void keep_memory(void) {
 #if defined(__GLIBC__)
-    mallopt(M_MMAP_THRESHOLD, 256 << 20);
+    mallopt(M_MMAP_THRESHOLD, 32 << 20); /* the most that every version takes */
     mallopt(M_TRIM_THRESHOLD, 256 << 20);
     mallopt(M_TOP_PAD, 16 << 20);
 #endif

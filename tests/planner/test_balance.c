@@ -12,6 +12,8 @@
 
 #include <cmocka.h>
 
+#include "tests/support/planted_sign.h" /* asserts */
+
 enum { NX = 4, NY = 3, CENTRES = 2 };
 
 typedef struct fixture {
@@ -105,6 +107,7 @@ static void expect_right(const fixture *f, const morph_block *block) {
     const morph_derivative_check c = check(f, block);
     if (!c.passed) print_error("%s\n", c.message);
     assert_true(c.passed);
+    assert_true(planted_signs_seen(block, f->z, block->unknowns) > 0);
 }
 
 /* Everything but contact: exact to the Hessian of the Lagrangian. */

@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "tests/support/planted_sign.h" /* asserts */
+
 enum { NX = 4, NY = 3, ROOM = 4000 };
 
 typedef struct fixture {
@@ -101,6 +103,7 @@ static void derivatives(void **state) {
         for (int b = 0; b < MORPH_AIM_BLOCKS; b++) {
             const morph_derivative_check c = compare(f, &block[b]);
             if (!c.passed) fail_msg("seed %u: %s", seed, c.message);
+            assert_true(planted_signs_seen(&block[b], f->x, block[b].unknowns) > 0);
         }
         morph_aim_destroy(aim);
     }

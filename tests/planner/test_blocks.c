@@ -12,6 +12,8 @@
 
 #include <cmocka.h>
 
+#include "tests/support/planted_sign.h" /* asserts */
+
 enum { NX = 4, NY = 3 };
 
 typedef struct fixture {
@@ -80,6 +82,7 @@ static void expect_right(const fixture *f, const morph_block *block) {
     assert_int_equal(morph_check_derivatives(block, 1, f->x, f->n, 1e-5, 1e-6, &check), MORPH_OK);
     if (!check.passed) print_error("%s\n", check.message);
     assert_true(check.passed);
+    assert_true(planted_signs_seen(block, f->x, f->n) > 0);
 }
 
 static void members(void **state) {
