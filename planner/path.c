@@ -388,6 +388,9 @@ morph_status morph_path_give_room(morph_pather *p, morph_curve **curve, bool pos
     return status;
 }
 
+/* A breach (spacings, rad) of a curve that is no longer one between its poses. */
+static const double swings = 0.5;
+
 /* One round of mending: false in *more when the curve holds, or no more poses would help. */
 static morph_status mend_once(morph_pather *p, morph_curve **curve, morph_kept *best, double *least,
                               double *before, bool *more) {
@@ -398,8 +401,10 @@ static morph_status mend_once(morph_pather *p, morph_curve **curve, morph_kept *
     double worst;
     morph_limit which;
     morph_status status = look(p, curve, breaches, &worst, &which);
-    /* More poses that do not bring it closer are no use. */
-    const bool hopeless = worst > 0.9 * *before && r->violation.amount[which] > 0.05;
+    /* More poses that do not bring it closer are no use; nor are they where poses that follow each other from
+     * the end turn so far that the curve swings between them. */
+    const bool hopeless = (worst > 0.9 * *before && r->violation.amount[which] > 0.05) ||
+                          (p->options->unfold && r->violation.amount[which] > swings);
     *before = worst;
     if (status == MORPH_OK && !r->feasible && worst < *least) {
         status = morph_keep(p, curve, INFINITY, best);

@@ -193,33 +193,33 @@ static morph_status trim_path(morph_planner *p) {
     return MORPH_OK;
 }
 
-/* First stepped back from the end; then so in more poses; then along the blanket's own way and the poses that
- * the refinement went through: the first that holds is taken. Where none does, the one that comes nearest is
- * moved as a whole, if it is near. The pure blanket gets its poses without a solve. So does what is left of a
- * path that was cut short, by a stop, a budget or a solver's death: of that, what holds is kept. */
+/* First stepped back from the end; then so in more poses. Where neither holds, the one that comes nearer is
+ * moved as a whole, if it is near; last along the blanket's own way and the poses that the refinement went
+ * through. The first that holds is taken. The pure blanket gets its poses without a solve. So does what is
+ * left of a path that was cut short, by a stop, a budget or a solver's death: of that, what holds is kept. */
 morph_status morph_stage_path(morph_planner *p) {
     static const way ways[] = {{.unfold = true, .intervals = 12},
                                {.unfold = true, .intervals = 24},
+                               {.nearly = true}, /* the nearest so far */
                                {.stations = true, .intervals = 24}};
-    enum { WAYS = sizeof ways / sizeof *ways };
     const double since = morph_seconds();
     const bool solve = p->options->method == MORPH_METHOD_IPOPT;
     kept_way kept = {.worst = INFINITY};
     morph_status status = MORPH_OK;
     bool cut = p->stopped || morph_planner_drafts(p);
     morph_planner_limit(p, MORPH_STAGE_PATH);
-    for (size_t k = 0; (k < WAYS || (k == WAYS && kept.nearly)) && status == MORPH_OK && solve;) {
-        const bool before = p->stopped;
-        way next = k < WAYS ? ways[k] : kept.way;
-        next.nearly = k == WAYS;
-        status = try_path(p, true, next, &kept);
+    for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK && solve;) {
+        const bool before = p->stopped, nearest = ways[k].nearly;
+        way next = nearest ? kept.way : ways[k];
+        next.nearly = nearest;
+        if (!nearest || kept.nearly) status = try_path(p, true, next, &kept);
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
         status = morph_planner_survive(p, status, MORPH_STAGE_PATH);
         /* No way leads inside its limits to an end that is not. */
         if (p->curve && (kept.worst <= 1.0 || !p->refined.feasible)) break;
         cut = cut || p->stopped || p->lost || morph_seconds() > p->deadline;
-        if (!before && p->stopped && k < WAYS) {
+        if (!before && p->stopped && !nearest) {
             morph_planner_limit(p, MORPH_STAGE_PATH); /* the same way again, in the time that a stop leaves */
             continue;
         }
