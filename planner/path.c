@@ -361,14 +361,33 @@ static morph_status look(morph_pather *p, morph_curve **curve, breach *breaches,
     return status;
 }
 
-/* Twice the inset of the poses about every interval that breaks a limit. */
-static bool step_back(morph_pather *p, const breach *breaches) {
+/* How far poses keep from a limit between the ends: more than that a curve between them gains by little. */
+static double room_for(const morph_inset *i, morph_limit limit) {
+    switch (limit) {
+    case MORPH_LIMIT_LENGTH:
+        return i->length;
+    case MORPH_LIMIT_ANGLE:
+        return i->angle;
+    case MORPH_LIMIT_SELF:
+        return i->self;
+    default:
+        return i->clearance;
+    }
+}
+
+/* Twice the inset of the poses about every interval that breaks a limit by no more than that can help: it is
+ * then taken for mended. */
+static bool step_back(morph_pather *p, breach *breaches) {
     bool any = false;
-    double *before = p->inset;
     for (int k = 0; k + 1 < p->count; k++) {
-        if (breaches[k].worst <= 1.0) continue;
+        const double amount = breaches[k].worst * morph_pose_tolerance[breaches[k].limit];
+        if (breaches[k].worst <= 1.0 || amount > room_for(&p->options->interior, breaches[k].limit)) continue;
         for (int m = k; m <= k + 1; m++)
-            if (m > 0 && m + 1 < p->count && before[m] < 2.0) before[m] = 2.0, any = true;
+            if (m > 0 && m + 1 < p->count && p->inset[m] < 2.0) {
+                p->inset[m] = 2.0;
+                breaches[k].worst = 0.0;
+                any = true;
+            }
     }
     return any;
 }
@@ -381,8 +400,9 @@ morph_status morph_path_give_room(morph_pather *p, morph_curve **curve, bool pos
     if (!breaches) return MORPH_ERR_NOMEM;
     morph_status status = look(p, curve, breaches, &worst, &which);
     if (status == MORPH_OK && !p->report->feasible) {
-        if (!poses) *more = step_back(p, breaches);
-        if (!*more) status = insert_poses(p, *curve, breaches, false, more);
+        const bool stepped = !poses && step_back(p, breaches);
+        status = insert_poses(p, *curve, breaches, false, more);
+        *more = *more || stepped;
     }
     free(breaches);
     return status;

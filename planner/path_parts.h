@@ -32,8 +32,8 @@ bool morph_path_out_of_time(const morph_pather *p);
  * them help; the curve that comes nearest is returned with its poses, and the report is of it. */
 morph_status morph_path_mend(morph_pather *p, morph_curve **curve);
 
-/* Draws the curve through the poses and examines it. Wherever it breaks a limit between two poses, these are
- * to keep twice their distance from limits; with poses, or where they are to already, a pose of the curve
+/* Draws the curve through the poses and examines it. Where it breaks a limit between two poses by little,
+ * these are to keep twice their distance from limits; where by more, or with poses, a pose of the curve
  * itself comes between them. *more: the poses are to be moved anew. */
 morph_status morph_path_give_room(morph_pather *p, morph_curve **curve, bool poses, bool *more);
 
