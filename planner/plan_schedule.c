@@ -114,6 +114,7 @@ morph_status morph_stage_project(morph_planner *p) {
 
 typedef struct way {
     bool unfold, stations, nearly; /* as of morph_path_options; stations: through those of the refinement */
+    bool nearest;                  /* the way that came nearest so far, once more */
     int intervals;
 } way;
 
@@ -200,8 +201,8 @@ static morph_status trim_path(morph_planner *p) {
 morph_status morph_stage_path(morph_planner *p) {
     static const way ways[] = {{.unfold = true, .intervals = 12},
                                {.unfold = true, .intervals = 24},
-                               {.nearly = true}, /* the nearest so far */
-                               {.stations = true, .intervals = 24}};
+                               {.nearest = true, .nearly = true},
+                               {.stations = true, .intervals = 24, .nearly = true}};
     const double since = morph_seconds();
     const bool solve = p->options->method == MORPH_METHOD_IPOPT;
     kept_way kept = {.worst = INFINITY};
@@ -209,9 +210,9 @@ morph_status morph_stage_path(morph_planner *p) {
     bool cut = p->stopped || morph_planner_drafts(p);
     morph_planner_limit(p, MORPH_STAGE_PATH);
     for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK && solve;) {
-        const bool before = p->stopped, nearest = ways[k].nearly;
+        const bool before = p->stopped, nearest = ways[k].nearest;
         way next = nearest ? kept.way : ways[k];
-        next.nearly = nearest;
+        next.nearly = ways[k].nearly;
         if (!nearest || kept.nearly) status = try_path(p, true, next, &kept);
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
