@@ -12,7 +12,7 @@ morph_path_options morph_path_defaults(void) {
     return (morph_path_options){.end = {.length = 1e-3, .angle = 2e-3, .clearance = 0.0, .self = 1e-3},
                                 .interior = {.length = 0.02, .angle = 0.03, .clearance = 0.06, .self = 0.02},
                                 .intervals = 12,
-                                .poses = 64,
+                                .poses = 96,
                                 .fine = 12,
                                 .sweeps = 1,
                                 .smoothness = 30.0,

@@ -199,10 +199,13 @@ static morph_status trim_path(morph_planner *p) {
  * through. The first that holds is taken. The pure blanket gets its poses without a solve. So does what is
  * left of a path that was cut short, by a stop, a budget or a solver's death: of that, what holds is kept. */
 morph_status morph_stage_path(morph_planner *p) {
-    static const way ways[] = {{.unfold = true, .intervals = 12},
-                               {.unfold = true, .intervals = 24},
-                               {.nearest = true, .nearly = true},
-                               {.stations = true, .intervals = 24, .nearly = true}};
+    /* The wider the sheet the further its joints go from pose to pose. */
+    const int *nodes = p->work.structure->def.nodes;
+    const bool wide = nodes[0] > 10 || nodes[1] > 10;
+    const way ways[] = {{.unfold = true, .intervals = wide ? 24 : 12},
+                        {.unfold = true, .intervals = wide ? 48 : 24},
+                        {.nearest = true, .nearly = true},
+                        {.stations = true, .intervals = 24, .nearly = true}};
     const double since = morph_seconds();
     const bool solve = p->options->method == MORPH_METHOD_IPOPT;
     kept_way kept = {.worst = INFINITY};
