@@ -472,7 +472,6 @@ static morph_status run(morph_pather *p, morph_curve **curve) {
     const morph_path_options *o = p->options;
     const bool worth = p->report->feasible || (o->nearly && holds_nearly(p));
     if (status == MORPH_OK && o->refine && o->whole && worth) status = morph_path_whole(p, curve);
-    p->report->nearly = status == MORPH_OK && holds_nearly(p);
     return status;
 }
 

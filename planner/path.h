@@ -39,7 +39,6 @@ typedef struct morph_path_report {
     morph_effort effort;
     double seconds;
     bool feasible;              /* on the fine grid, by exact examination */
-    bool nearly;                /* it is not, but near enough to be moved as a whole */
     morph_violation violation;  /* worst over the fine grid */
     double where[MORPH_LIMITS]; /* parameter of each */
 } morph_path_report;

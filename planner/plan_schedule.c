@@ -114,19 +114,11 @@ morph_status morph_stage_project(morph_planner *p) {
 
 typedef struct way {
     bool unfold, stations, nearly; /* as of morph_path_options; stations: through those of the refinement */
-    bool nearest;                  /* the way that came nearest so far, once more */
     int intervals;
 } way;
 
-/* Of the ways tried so far, the one whose path is kept. */
-typedef struct kept_way {
-    way way;
-    double worst; /* violation over its tolerance: above 1 it breaks a limit */
-    bool nearly;  /* by little */
-} kept_way;
-
 /* One way to a path; kept if it is feasible or breaks its limits less than the one before. */
-static morph_status try_path(morph_planner *p, bool solve, way w, kept_way *kept) {
+static morph_status try_path(morph_planner *p, bool solve, way w, double *least) {
     morph_path_options o = morph_path_defaults();
     o.control = morph_planner_control(p);
     o.refine = solve;
@@ -154,10 +146,10 @@ static morph_status try_path(morph_planner *p, bool solve, way w, kept_way *kept
     s->callback_seconds += r.effort.callback_seconds;
     const double worst = morph_violation_worst(&r.violation, morph_pose_tolerance, NULL);
     if (r.deaths > 0) morph_planner_survive(p, MORPH_ERR_BACKEND, MORPH_STAGE_PATH);
-    if (status == MORPH_OK && curve && (!p->curve || worst < kept->worst)) {
+    if (status == MORPH_OK && curve && (!p->curve || worst < *least)) {
         morph_curve_destroy(p->curve);
         p->curve = curve;
-        *kept = (kept_way){w, worst, r.nearly};
+        *least = worst;
         s->unknowns_path = r.effort.unknowns;
         s->rows_path_used = r.effort.rows;
         s->rows_path_possible = r.rows_possible;
@@ -168,11 +160,11 @@ static morph_status try_path(morph_planner *p, bool solve, way w, kept_way *kept
 }
 
 /* Poses without a solve, the quickest that there is. The pure blanket's way is that of its own. */
-static morph_status plain_path(morph_planner *p, kept_way *kept) {
+static morph_status plain_path(morph_planner *p, double *least) {
     p->deadline = INFINITY;
-    morph_status status = try_path(p, false, (way){.intervals = 24}, kept);
-    if (status == MORPH_OK && p->refined.stations > 0 && kept->worst > 1.0)
-        status = try_path(p, false, (way){.stations = true, .intervals = 24}, kept);
+    morph_status status = try_path(p, false, (way){.intervals = 24}, least);
+    if (status == MORPH_OK && p->refined.stations > 0 && *least > 1.0)
+        status = try_path(p, false, (way){.stations = true, .intervals = 24}, least);
     return status;
 }
 
@@ -194,36 +186,33 @@ static morph_status trim_path(morph_planner *p) {
     return MORPH_OK;
 }
 
-/* First stepped back from the end; then so in more poses. Where neither holds, the one that comes nearer is
- * moved as a whole, if it is near; last along the blanket's own way and the poses that the refinement went
- * through. The first that holds is taken. The pure blanket gets its poses without a solve. So does what is
- * left of a path that was cut short, by a stop, a budget or a solver's death: of that, what holds is kept. */
+/* First stepped back from the end; then so in more poses; last along the blanket's own way and the poses that
+ * the refinement went through: the first that holds is taken. The last two are moved as a whole also where
+ * they nearly hold. The pure blanket gets its poses without a solve. So does what is left of a path that was
+ * cut short, by a stop, a budget or a solver's death: of that, what holds is kept. */
 morph_status morph_stage_path(morph_planner *p) {
     /* The wider the sheet the further its joints go from pose to pose. */
     const int *nodes = p->work.structure->def.nodes;
     const bool wide = nodes[0] > 10 || nodes[1] > 10;
     const way ways[] = {{.unfold = true, .intervals = wide ? 24 : 12},
-                        {.unfold = true, .intervals = wide ? 48 : 24},
-                        {.nearest = true, .nearly = true},
+                        {.unfold = true, .intervals = wide ? 48 : 24, .nearly = true},
                         {.stations = true, .intervals = 24, .nearly = true}};
     const double since = morph_seconds();
     const bool solve = p->options->method == MORPH_METHOD_IPOPT;
-    kept_way kept = {.worst = INFINITY};
+    double least = INFINITY;
     morph_status status = MORPH_OK;
     bool cut = p->stopped || morph_planner_drafts(p);
     morph_planner_limit(p, MORPH_STAGE_PATH);
     for (size_t k = 0; k < sizeof ways / sizeof *ways && status == MORPH_OK && solve;) {
-        const bool before = p->stopped, nearest = ways[k].nearest;
-        way next = nearest ? kept.way : ways[k];
-        next.nearly = ways[k].nearly;
-        if (!nearest || kept.nearly) status = try_path(p, true, next, &kept);
+        const bool before = p->stopped;
+        status = try_path(p, true, ways[k], &least);
         cut = cut || status != MORPH_OK;
         status = morph_planner_ended(p, status, MORPH_STAGE_PATH);
         status = morph_planner_survive(p, status, MORPH_STAGE_PATH);
         /* No way leads inside its limits to an end that is not. */
-        if (p->curve && (kept.worst <= 1.0 || !p->refined.feasible)) break;
+        if (p->curve && (least <= 1.0 || !p->refined.feasible)) break;
         cut = cut || p->stopped || p->lost || morph_seconds() > p->deadline;
-        if (!before && p->stopped && !nearest) {
+        if (!before && p->stopped) {
             morph_planner_limit(p, MORPH_STAGE_PATH); /* the same way again, in the time that a stop leaves */
             continue;
         }
@@ -234,9 +223,9 @@ morph_status morph_stage_path(morph_planner *p) {
     /* With a plan in hand nothing is patched up for want of time. */
     if (status == MORPH_OK && !p->curve && !p->stopped && p->draft.there && p->draft.summary.feasible)
         status = MORPH_ERR_STOPPED;
-    const bool plain = !p->curve || (solve && cut && kept.worst > 1.0 && !p->draft.there);
-    if (status == MORPH_OK && plain) status = plain_path(p, &kept);
-    if (status == MORPH_OK && solve && cut && (plain || kept.worst > 1.0)) status = trim_path(p);
+    const bool plain = !p->curve || (solve && cut && least > 1.0 && !p->draft.there);
+    if (status == MORPH_OK && plain) status = plain_path(p, &least);
+    if (status == MORPH_OK && solve && cut && (plain || least > 1.0)) status = trim_path(p);
     morph_planner_time(p, MORPH_STAGE_PATH, since);
     return status;
 }

@@ -147,7 +147,7 @@ static morph_status product(const morph_planner *p, outcome *o) {
     static const struct {
         bool unfold, stations;
         int intervals;
-    } ways[] = {{true, false, 12}, {false, true, 24}, {true, false, 24}};
+    } ways[] = {{true, false, 12}, {true, false, 24}, {false, true, 24}};
     morph_status status = MORPH_OK;
     morph_curve *curve = NULL;
     const double since = cpu_seconds();

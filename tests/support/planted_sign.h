@@ -31,7 +31,7 @@ static double planted_pass(planted_entries *e, double value) {
     return e->next++ == e->turned ? -value : value;
 }
 
-/* Zero where nothing is asked for: a walk may emit both kinds whatever is wanted. */
+/* Only what is asked for counts: a walk may emit both kinds whatever is wanted. */
 void __wrap_morph_sink_jacobian(morph_sink *s, int row, int unknown, double value) {
     const double passed = morph_sink_wants_jacobian(s) ? planted_pass(&planted_first, value) : value;
     __real_morph_sink_jacobian(s, row, unknown, passed);
